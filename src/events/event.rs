@@ -1,0 +1,206 @@
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::ids::{Digest, Seq, UserId};
+use crate::language::{Answer, Document, Program, Utterance};
+
+/// A fact of one person's life with the robot. Domain-neutral; what a domain knows travels inside
+/// [`Document`] and [`Program`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    SessionOpened(SessionOpened),
+    EpisodeStarted(EpisodeStarted),
+    Interpreted(Interpreted),
+    EpisodeEnded(EpisodeEnded),
+    DecompositionTaught(DecompositionTaught),
+    DecompositionDeclined(DecompositionDeclined),
+    LessonForgotten(LessonForgotten),
+    RetrainScheduled(RetrainScheduled),
+    RetrainCompleted(RetrainCompleted),
+    RetrainFailed(RetrainFailed),
+    SessionClosed(SessionClosed),
+}
+
+/// The number of a kind in record headers. Never reused, never renumbered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u16)]
+pub enum EventKind {
+    SessionOpened = 1,
+    EpisodeStarted = 2,
+    Interpreted = 3,
+    EpisodeEnded = 4,
+    DecompositionTaught = 5,
+    DecompositionDeclined = 6,
+    LessonForgotten = 7,
+    RetrainScheduled = 8,
+    RetrainCompleted = 9,
+    RetrainFailed = 10,
+    SessionClosed = 11,
+}
+
+/// A stream began: who, in which world, with which recipe.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SessionOpened {
+    pub user: UserId,
+    pub domain: String,
+    pub domain_version: u16,
+    pub recipe: String,
+    /// The recipe's own text (TOML), so that a stream can be replayed when the file is long gone.
+    pub recipe_text: String,
+    pub recipe_digest: Digest,
+    /// The base mind.
+    pub mind: Digest,
+}
+
+/// The stage was set. The event carries the whole scene: replay reads no generator and no file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeStarted {
+    pub scene: Document,
+    pub scene_digest: Digest,
+    pub task: Document,
+    /// The task as a sentence.
+    pub goal: String,
+    /// The seed of a drawn stage; none when a scene file was given.
+    pub seed: Option<u64>,
+    /// The fewest primitives that achieve the task from this scene, where the planner found them.
+    pub fewest: Option<u32>,
+}
+
+/// A person said something, and this is what came of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Interpreted {
+    pub utterance: Utterance,
+    pub answer: Answer,
+    /// Primitives carried out in this episode before this utterance; its own, if any, are counted
+    /// from the next number on.
+    pub actions_before: u32,
+    pub scene_after: Digest,
+    pub mind: Digest,
+}
+
+/// How an episode came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    Achieved,
+    Abandoned,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeEnded {
+    pub ending: Ending,
+    pub utterances: u32,
+    /// Primitives carried out.
+    pub actions: u32,
+    /// The [`Interpreted`] events that may be taught now; when empty there is no teaching.
+    pub to_teach: Vec<Seq>,
+}
+
+/// A person said which run of actions an utterance stands for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DecompositionTaught {
+    /// The [`Interpreted`] event that is explained.
+    pub explains: Seq,
+    pub utterance: Utterance,
+    pub program: Program,
+    /// The run of actions of the episode, counted from 1, both ends included.
+    pub first: u32,
+    pub last: u32,
+}
+
+/// A person said that nothing they did was what an utterance stands for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DecompositionDeclined {
+    pub explains: Seq,
+    pub utterance: Utterance,
+}
+
+/// A lesson was taken back. `lesson` is its [`DecompositionTaught`] event.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LessonForgotten {
+    pub lesson: Seq,
+    pub utterance: Utterance,
+}
+
+/// A training is due: a pure function of the recipe and these lessons, in this order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RetrainScheduled {
+    pub recipe: Digest,
+    pub lessons: Vec<Seq>,
+}
+
+/// What a training measured about itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+pub struct Report {
+    /// Seeds and live lessons.
+    pub exemplars: u32,
+    pub threshold: f32,
+    /// Everything else the parser kind reports, by name.
+    pub figures: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RetrainCompleted {
+    pub recipe: Digest,
+    pub mind: Digest,
+    pub report: Report,
+}
+
+/// The previous mind stays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RetrainFailed {
+    pub recipe: Digest,
+    pub reason: String,
+}
+
+/// The person withdrew. Final.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SessionClosed {
+    pub reason: String,
+}
+
+impl Event {
+    pub fn kind(&self) -> EventKind {
+        match self {
+            Event::SessionOpened(_) => EventKind::SessionOpened,
+            Event::EpisodeStarted(_) => EventKind::EpisodeStarted,
+            Event::Interpreted(_) => EventKind::Interpreted,
+            Event::EpisodeEnded(_) => EventKind::EpisodeEnded,
+            Event::DecompositionTaught(_) => EventKind::DecompositionTaught,
+            Event::DecompositionDeclined(_) => EventKind::DecompositionDeclined,
+            Event::LessonForgotten(_) => EventKind::LessonForgotten,
+            Event::RetrainScheduled(_) => EventKind::RetrainScheduled,
+            Event::RetrainCompleted(_) => EventKind::RetrainCompleted,
+            Event::RetrainFailed(_) => EventKind::RetrainFailed,
+            Event::SessionClosed(_) => EventKind::SessionClosed,
+        }
+    }
+}
+
+impl EventKind {
+    pub const ALL: [EventKind; 11] = [
+        EventKind::SessionOpened,
+        EventKind::EpisodeStarted,
+        EventKind::Interpreted,
+        EventKind::EpisodeEnded,
+        EventKind::DecompositionTaught,
+        EventKind::DecompositionDeclined,
+        EventKind::LessonForgotten,
+        EventKind::RetrainScheduled,
+        EventKind::RetrainCompleted,
+        EventKind::RetrainFailed,
+        EventKind::SessionClosed,
+    ];
+
+    /// The version of the body that this binary writes.
+    pub fn version(self) -> u16 {
+        1
+    }
+
+    pub fn from_number(number: u16) -> Option<EventKind> {
+        EventKind::ALL
+            .into_iter()
+            .find(|kind| *kind as u16 == number)
+    }
+}

@@ -1,0 +1,15 @@
+//! What happened, in the past tense: the one [`Event`] enum, its record on disk, and the codec.
+
+mod codec;
+mod event;
+mod receipt;
+mod record;
+
+pub use codec::{DecodeError, decode, encode};
+pub use event::{
+    DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
+    EventKind, Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed,
+    RetrainScheduled, SessionClosed, SessionOpened,
+};
+pub use receipt::Durable;
+pub use record::{Batch, Head, Header, HeaderError, Record, commitment};

@@ -1,0 +1,331 @@
+//! The names of things: identifiers that cannot be mistaken for one another.
+
+use std::fmt;
+use std::num::NonZeroU64;
+use std::str::FromStr;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::limits;
+
+/// Why a piece of text is no identifier.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum IdError {
+    #[error("a {what} must not be empty")]
+    Empty { what: &'static str },
+    #[error("a {what} has at most {max} bytes, this one has {found}")]
+    TooLong {
+        what: &'static str,
+        max: usize,
+        found: usize,
+    },
+    #[error("a {what} may not contain {found:?}; allowed are {allowed}")]
+    Character {
+        what: &'static str,
+        found: char,
+        allowed: &'static str,
+    },
+    #[error("{found:?} is no {what}: expected {expected}")]
+    Form {
+        what: &'static str,
+        found: String,
+        expected: &'static str,
+    },
+}
+
+/// A lab. Lower-case letters, digits and hyphens, 1 to [`limits::TENANT_BYTES_MAX`] bytes.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct TenantId(String);
+
+impl TenantId {
+    /// The tenant of the single-user default.
+    pub fn local() -> Self {
+        TenantId("local".to_owned())
+    }
+
+    /// - errors: empty, longer than [`limits::TENANT_BYTES_MAX`], or a character that is not
+    ///   `a-z`, `0-9` or `-`: a tenant names files and trees, so it must never carry a path.
+    pub fn new(text: &str) -> Result<Self, IdError> {
+        check_length("tenant", text, limits::TENANT_BYTES_MAX)?;
+        let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        match text.chars().find(|&c| !allowed(c)) {
+            Some(found) => Err(IdError::Character {
+                what: "tenant",
+                found,
+                allowed: "a-z, 0-9 and '-'",
+            }),
+            None => Ok(TenantId(text.to_owned())),
+        }
+    }
+
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for TenantId {
+    type Error = IdError;
+    fn try_from(text: String) -> Result<Self, IdError> {
+        TenantId::new(&text)
+    }
+}
+
+impl From<TenantId> for String {
+    fn from(id: TenantId) -> String {
+        id.0
+    }
+}
+
+impl fmt::Display for TenantId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// A person inside a tenant, as the tenant's gateway names them. Any printable text without
+/// control characters; it appears in no key, head or proof (see [`StreamId`]).
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct UserId(String);
+
+impl UserId {
+    /// - errors: empty, longer than [`limits::USER_BYTES_MAX`], or a control character.
+    pub fn new(text: &str) -> Result<Self, IdError> {
+        check_length("user", text, limits::USER_BYTES_MAX)?;
+        match text.chars().find(|c| c.is_control()) {
+            Some(found) => Err(IdError::Character {
+                what: "user",
+                found,
+                allowed: "printable characters",
+            }),
+            None => Ok(UserId(text.to_owned())),
+        }
+    }
+
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for UserId {
+    type Error = IdError;
+    fn try_from(text: String) -> Result<Self, IdError> {
+        UserId::new(&text)
+    }
+}
+
+impl From<UserId> for String {
+    fn from(id: UserId) -> String {
+        id.0
+    }
+}
+
+impl fmt::Display for UserId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+// A user name is personal data: it must not slip into a log line through `{:?}`.
+impl fmt::Debug for UserId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("UserId(..)")
+    }
+}
+
+fn check_length(what: &'static str, text: &str, max: usize) -> Result<(), IdError> {
+    match text.len() {
+        0 => Err(IdError::Empty { what }),
+        found if found > max => Err(IdError::TooLong { what, max, found }),
+        _ => Ok(()),
+    }
+}
+
+/// One person's life in one tenant: the unit of order, of sealing and of replay.
+///
+/// `key` is a keyed hash of the user name (`store::keys`), so that names stand in no key.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct StreamId {
+    pub tenant: TenantId,
+    pub key: StreamKey,
+}
+
+impl fmt::Display for StreamId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.tenant, self.key)
+    }
+}
+
+/// Declares a fixed-size byte identifier that reads and prints as lower-case hex and is stored as
+/// MessagePack `bin`.
+macro_rules! byte_id {
+    ($(#[$doc:meta])* $name:ident, $size:expr, $what:literal, $expected:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub [u8; $size]);
+
+        impl $name {
+            pub fn to_hex(&self) -> String {
+                self.0.iter().map(|byte| format!("{byte:02x}")).collect()
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(&self.to_hex())
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "{}({})", stringify!($name), self.to_hex())
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = IdError;
+            fn from_str(text: &str) -> Result<Self, IdError> {
+                let wrong = || IdError::Form {
+                    what: $what,
+                    found: text.chars().take(80).collect(),
+                    expected: $expected,
+                };
+                if text.len() != 2 * $size || !text.is_ascii() {
+                    return Err(wrong());
+                }
+                let mut bytes = [0; $size];
+                for (index, byte) in bytes.iter_mut().enumerate() {
+                    *byte = u8::from_str_radix(&text[2 * index..2 * index + 2], 16)
+                        .map_err(|_| wrong())?;
+                }
+                Ok($name(bytes))
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                if serializer.is_human_readable() {
+                    serializer.serialize_str(&self.to_hex())
+                } else {
+                    serializer.serialize_bytes(&self.0)
+                }
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Visitor;
+                impl serde::de::Visitor<'_> for Visitor {
+                    type Value = $name;
+                    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                        f.write_str($expected)
+                    }
+                    fn visit_bytes<E: serde::de::Error>(self, v: &[u8]) -> Result<$name, E> {
+                        let bytes = v
+                            .try_into()
+                            .map_err(|_| E::invalid_length(v.len(), &self))?;
+                        Ok($name(bytes))
+                    }
+                    fn visit_str<E: serde::de::Error>(self, v: &str) -> Result<$name, E> {
+                        v.parse().map_err(E::custom)
+                    }
+                }
+                if deserializer.is_human_readable() {
+                    deserializer.deserialize_str(Visitor)
+                } else {
+                    deserializer.deserialize_bytes(Visitor)
+                }
+            }
+        }
+    };
+}
+
+byte_id!(
+    /// The keyed hash that stands for a user name. 16 bytes.
+    StreamKey, 16, "stream key", "32 hexadecimal digits"
+);
+byte_id!(
+    /// Names one request of one client, for ever: a retry carries the same one. 16 bytes.
+    RequestId, 16, "request id", "32 hexadecimal digits"
+);
+byte_id!(
+    /// BLAKE3, 256 bits.
+    Digest, 32, "digest", "64 hexadecimal digits"
+);
+
+impl Digest {
+    /// What the first record of a stream names as its predecessor.
+    pub const ZERO: Digest = Digest([0; 32]);
+
+    pub fn of(bytes: &[u8]) -> Digest {
+        Digest(*blake3::hash(bytes).as_bytes())
+    }
+
+    /// The first twelve hexadecimal digits: enough for a person to compare.
+    pub fn short(&self) -> String {
+        self.to_hex()[..12].to_owned()
+    }
+}
+
+/// The place of a record in its stream: 1, 2, 3, … without a gap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Seq(NonZeroU64);
+
+impl Seq {
+    pub const FIRST: Seq = Seq(NonZeroU64::MIN);
+
+    pub fn new(number: u64) -> Option<Seq> {
+        NonZeroU64::new(number).map(Seq)
+    }
+
+    pub fn get(self) -> u64 {
+        self.0.get()
+    }
+
+    pub fn next(self) -> Seq {
+        Seq(self
+            .0
+            .checked_add(1)
+            .expect("a stream never reaches 2^64 records"))
+    }
+}
+
+impl fmt::Display for Seq {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+/// Microseconds since 1970-01-01T00:00Z, monotone within a stream.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Default,
+)]
+pub struct Timestamp(pub u64);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tenant_never_carries_a_path() {
+        for bad in ["", "../x", "a/b", "A", "a\0", "ä", &"a".repeat(65)] {
+            assert!(TenantId::new(bad).is_err(), "{bad:?}");
+        }
+        assert_eq!(TenantId::new("lab-7").unwrap().as_str(), "lab-7");
+    }
+
+    #[test]
+    fn hex_is_read_back() {
+        let id = RequestId(*b"0123456789abcdef");
+        assert_eq!(id.to_hex().parse::<RequestId>().unwrap(), id);
+        assert!("zz".parse::<RequestId>().is_err());
+        assert!("ä".repeat(16).parse::<RequestId>().is_err());
+    }
+
+    #[test]
+    fn a_user_name_does_not_print_in_debug() {
+        let user = UserId::new("Ada Lovelace").unwrap();
+        assert!(!format!("{user:?}").contains("Ada"));
+    }
+}

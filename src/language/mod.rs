@@ -1,0 +1,17 @@
+//! What people say and what programs are, before any meaning is guessed. Domain-neutral.
+
+mod answer;
+mod document;
+mod lifted;
+mod program;
+mod signature;
+mod symbol;
+mod utterance;
+
+pub use answer::{Answer, Discarded, Evidence, Near, Outcome};
+pub use document::Document;
+pub use lifted::{LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Mention, Word};
+pub use program::{Program, ProgramError, Step};
+pub use signature::{Operator, Signature};
+pub use symbol::Symbol;
+pub use utterance::{Utterance, UtteranceError, tokens};

@@ -1,0 +1,147 @@
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::limits::{UTTERANCE_BYTES_MAX, UTTERANCE_WORDS_MAX};
+
+/// What a person typed, checked but otherwise untouched.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Utterance(String);
+
+/// Why a text is no utterance. A sentence for the person who typed it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum UtteranceError {
+    #[error("that was empty; type what the robot should do")]
+    Empty,
+    #[error("that has no words in it; type what the robot should do")]
+    NoWords,
+    #[error("that has {found} bytes; at most {UTTERANCE_BYTES_MAX} are read, so say it in parts")]
+    TooManyBytes { found: usize },
+    #[error("that has {found} words; at most {UTTERANCE_WORDS_MAX} are read, so say it in parts")]
+    TooManyWords { found: usize },
+    #[error("that contains the control character {found:?}; type plain text")]
+    Control { found: char },
+}
+
+impl Utterance {
+    /// White space around the text is dropped, tabs count as blanks.
+    ///
+    /// - errors: empty, without a single word, too long in bytes or words, or with a control
+    ///   character.
+    pub fn new(text: &str) -> Result<Utterance, UtteranceError> {
+        if text.len() > UTTERANCE_BYTES_MAX {
+            return Err(UtteranceError::TooManyBytes { found: text.len() });
+        }
+        let text = text.trim().replace('\t', " ");
+        if text.is_empty() {
+            return Err(UtteranceError::Empty);
+        }
+        if let Some(found) = text.chars().find(|c| c.is_control()) {
+            return Err(UtteranceError::Control { found });
+        }
+        let words = tokens(&text).iter().filter(|token| is_word(token)).count();
+        match words {
+            0 => Err(UtteranceError::NoWords),
+            found if found > UTTERANCE_WORDS_MAX => Err(UtteranceError::TooManyWords { found }),
+            _ => Ok(Utterance(text)),
+        }
+    }
+
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// The words and clause marks, lower-cased; see [`tokens`].
+    pub fn tokens(&self) -> Vec<String> {
+        tokens(&self.0)
+    }
+}
+
+impl TryFrom<String> for Utterance {
+    type Error = UtteranceError;
+    fn try_from(text: String) -> Result<Utterance, UtteranceError> {
+        Utterance::new(&text)
+    }
+}
+
+impl From<Utterance> for String {
+    fn from(utterance: Utterance) -> String {
+        utterance.0
+    }
+}
+
+impl fmt::Display for Utterance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+fn is_word(token: &str) -> bool {
+    token.chars().any(char::is_alphanumeric)
+}
+
+/// Lower-cased words (letters, digits, inner apostrophes) and the clause marks `,` `.` `;`, in
+/// order; everything else separates words.
+///
+/// Only ASCII apostrophes join ("don't"); a hyphen separates ("dish-rag" is two words), as people
+/// write compounds either way.
+pub fn tokens(text: &str) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut word = String::new();
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        let joins =
+            c == '\'' && !word.is_empty() && chars.peek().is_some_and(|n| n.is_alphanumeric());
+        if c.is_alphanumeric() || joins {
+            word.extend(c.to_lowercase());
+            continue;
+        }
+        if !word.is_empty() {
+            out.push(std::mem::take(&mut word));
+        }
+        if matches!(c, ',' | '.' | ';') {
+            out.push(c.to_string());
+        }
+    }
+    if !word.is_empty() {
+        out.push(word);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_and_clause_marks_are_kept() {
+        assert_eq!(
+            tokens("Pick up the Mug, then DON'T wash-it."),
+            [
+                "pick", "up", "the", "mug", ",", "then", "don't", "wash", "it", "."
+            ]
+        );
+    }
+
+    #[test]
+    fn bad_utterances_get_one_clear_sentence() {
+        assert_eq!(Utterance::new("  "), Err(UtteranceError::Empty));
+        assert_eq!(Utterance::new("🤖 !!"), Err(UtteranceError::NoWords));
+        assert!(matches!(
+            Utterance::new("a\u{0}b"),
+            Err(UtteranceError::Control { .. })
+        ));
+        let long = "go ".repeat(10_000);
+        assert!(matches!(
+            Utterance::new(&long),
+            Err(UtteranceError::TooManyBytes { .. })
+        ));
+        let wordy = "go ".repeat(200);
+        assert!(matches!(
+            Utterance::new(&wordy),
+            Err(UtteranceError::TooManyWords { found: 200 })
+        ));
+        assert!(Utterance::new("wash the <b>mug</b> 🍵").is_ok());
+    }
+}

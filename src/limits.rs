@@ -1,0 +1,79 @@
+//! Every bound of the service, with its unit and its reason. Related bounds are compared at
+//! compile time at the end of the file. (Invariant `Bounded`.)
+
+/// Bytes of a tenant's name: it is a file name and a tree name.
+pub const TENANT_BYTES_MAX: usize = 64;
+/// Bytes of a user's name.
+pub const USER_BYTES_MAX: usize = 128;
+
+/// Bytes of one utterance. The longest recorded human sentence has under 500.
+pub const UTTERANCE_BYTES_MAX: usize = 2_000;
+/// Words of one utterance.
+pub const UTTERANCE_WORDS_MAX: usize = 150;
+/// Mentions of objects in one utterance; later ones stay plain words.
+pub const MENTIONS_MAX: usize = 16;
+/// Clauses an utterance is split into.
+pub const CLAUSES_MAX: usize = 8;
+
+/// Primitives of one program. The longest ALFRED plan has 30.
+pub const PROGRAM_STEPS_MAX: usize = 128;
+/// Candidate programs kept per utterance, after removing equal ones.
+pub const CANDIDATES_MAX: usize = 32;
+/// Combinations tried in the cross product of clauses.
+pub const COMBINATIONS_MAX: usize = 256;
+/// Exemplars shown as evidence.
+pub const EVIDENCE_NEAREST_MAX: usize = 3;
+/// Discarded candidates shown as evidence.
+pub const EVIDENCE_DISCARDED_MAX: usize = 5;
+
+/// Utterances of one episode; then the episode must be ended.
+pub const EPISODE_UTTERANCES_MAX: usize = 500;
+/// Executed primitives of one episode.
+pub const EPISODE_ACTIONS_MAX: usize = 2_000;
+/// Live lessons of one person. Training time grows with their square.
+pub const LESSONS_MAX: usize = 1_000;
+/// Objects of one scene.
+pub const SCENE_OBJECTS_MAX: usize = 400;
+/// Bytes of a scene file or a task description that a client sends.
+pub const SCENE_FILE_BYTES_MAX: usize = 256 * 1024;
+
+/// Request ids remembered per stream.
+pub const REQUEST_RING: usize = 1_024;
+/// Requests one client may have unanswered; far below [`REQUEST_RING`], or a retry could come
+/// back after its id was forgotten.
+pub const CLIENT_IN_FLIGHT_MAX: usize = 64;
+/// Seconds during which a client retries a request.
+pub const CLIENT_RETRY_S_MAX: u64 = 60;
+
+/// Bytes of one `sled` value. Larger values go to blob files that are never fsynced
+/// (docs/adr: group commit), so anything larger is chunked.
+pub const STORE_VALUE_BYTES_MAX: usize = 8 * 1024;
+/// Bytes of one record's body before sealing.
+pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
+/// Events of one batch: one command's worth.
+pub const BATCH_EVENTS_MAX: usize = 16;
+/// Batches waiting for the committer; then an append is refused as busy.
+pub const COMMIT_QUEUE_MAX: usize = 4_096;
+/// Batches flushed together.
+pub const COMMIT_GROUP_MAX: usize = 512;
+
+/// Messages waiting in one user's mailbox; then an honest `Busy`.
+pub const MAILBOX_MAX: usize = 32;
+/// Users awake at once; the longest idle one goes to sleep.
+pub const AWAKE_USERS_MAX: usize = 10_000;
+/// Trainings waiting for a trainer.
+pub const TRAIN_QUEUE_MAX: usize = 1_024;
+/// Bytes of one wire frame.
+pub const FRAME_BYTES_MAX: usize = 512 * 1024;
+/// Frames of one wire message, the envelope included.
+pub const FRAMES_MAX: usize = 4;
+/// Requests the gateway has handed to actors and not yet answered.
+pub const GATEWAY_IN_FLIGHT_MAX: usize = 8_192;
+
+const _: () = {
+    assert!(CLIENT_IN_FLIGHT_MAX < REQUEST_RING);
+    assert!(UTTERANCE_BYTES_MAX < FRAME_BYTES_MAX);
+    assert!(SCENE_FILE_BYTES_MAX < FRAME_BYTES_MAX);
+    assert!(COMMIT_GROUP_MAX <= COMMIT_QUEUE_MAX);
+    assert!(PROGRAM_STEPS_MAX <= EPISODE_ACTIONS_MAX);
+};

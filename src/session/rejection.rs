@@ -1,0 +1,132 @@
+use serde::{Deserialize, Serialize};
+
+use super::Phase;
+use crate::ids::Seq;
+use crate::language::{LiftedUtterance, Program, UtteranceError};
+use crate::limits::{
+    EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
+};
+use crate::world::StageError;
+
+/// Why a command was declined. Normal; nothing was recorded. The text is for the person who asked.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Rejection {
+    #[error(transparent)]
+    Utterance(#[from] UtteranceError),
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    #[error("{command} is not possible {}; {}", phase_words(*phase), way_out(*phase))]
+    WrongPhase { command: &'static str, phase: Phase },
+    #[error("still learning from the last lessons; try again in a moment")]
+    StillLearning,
+    #[error("the session was closed for good")]
+    Closed,
+    #[error("the session is already open")]
+    AlreadyOpen,
+    #[error("there is no utterance to teach at record {explains}; status lists what can be taught")]
+    NothingToTeach { explains: Seq },
+    #[error("the utterance at record {explains} was explained already")]
+    TaughtAlready { explains: Seq },
+    #[error("actions {actions:?} are no contiguous run; name a first and a last action")]
+    NotContiguous { actions: Vec<u32> },
+    #[error("actions {first}..{last} do not exist: this episode has {have}")]
+    NoSuchAction { first: u32, last: u32, have: u32 },
+    #[error(
+        "action {first} came before \"{utterance}\" was said; choose from action {} on",
+        before + 1
+    )]
+    NotAfter {
+        first: u32,
+        before: u32,
+        utterance: String,
+    },
+    /// The same lifted form, or one that would swallow it, is taken by another program.
+    #[error(
+        "\"{utterance}\" is already known as {known} ({}); replace it, keep both, or cancel",
+        whose(*lesson)
+    )]
+    Clash {
+        utterance: LiftedUtterance,
+        known: Program,
+        lesson: Option<Seq>,
+    },
+    #[error("there is no live lesson at record {lesson}")]
+    NoSuchLesson { lesson: Seq },
+    #[error("{LESSONS_MAX} lessons are kept at most; forget one first")]
+    TooManyLessons,
+    #[error(
+        "an episode has at most {EPISODE_UTTERANCES_MAX} utterances and {EPISODE_ACTIONS_MAX} \
+         actions; say done and start another"
+    )]
+    EpisodeFull,
+    #[error("the scene has {found} bytes; at most {SCENE_FILE_BYTES_MAX} are read")]
+    SceneTooLarge { found: usize },
+    #[error("no training is running for recipe {recipe}")]
+    NoTraining { recipe: String },
+    #[error("the recipe cannot be read: {reason}")]
+    Recipe { reason: String },
+}
+
+/// What a program may branch on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RejectionCode {
+    BadUtterance,
+    BadStage,
+    WrongPhase,
+    StillLearning,
+    Closed,
+    BadTeach,
+    Clash,
+    NoSuchLesson,
+    LimitReached,
+    Internal,
+}
+
+impl Rejection {
+    pub fn code(&self) -> RejectionCode {
+        match self {
+            Rejection::Utterance(_) => RejectionCode::BadUtterance,
+            Rejection::Stage(_) | Rejection::SceneTooLarge { .. } => RejectionCode::BadStage,
+            Rejection::WrongPhase { .. } | Rejection::AlreadyOpen => RejectionCode::WrongPhase,
+            Rejection::StillLearning => RejectionCode::StillLearning,
+            Rejection::Closed => RejectionCode::Closed,
+            Rejection::NothingToTeach { .. }
+            | Rejection::TaughtAlready { .. }
+            | Rejection::NotContiguous { .. }
+            | Rejection::NoSuchAction { .. }
+            | Rejection::NotAfter { .. } => RejectionCode::BadTeach,
+            Rejection::Clash { .. } => RejectionCode::Clash,
+            Rejection::NoSuchLesson { .. } => RejectionCode::NoSuchLesson,
+            Rejection::TooManyLessons | Rejection::EpisodeFull => RejectionCode::LimitReached,
+            Rejection::NoTraining { .. } | Rejection::Recipe { .. } => RejectionCode::Internal,
+        }
+    }
+}
+
+fn phase_words(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Idle => "between episodes",
+        Phase::Interacting => "during an episode",
+        Phase::Teaching => "while lessons are being taught",
+        Phase::Learning => "while learning",
+        Phase::Closed => "in a closed session",
+    }
+}
+
+fn way_out(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Idle => "start an episode first",
+        Phase::Interacting => "reach the goal or say done first",
+        Phase::Teaching => "finish teaching first",
+        Phase::Learning => "wait until it has learned",
+        Phase::Closed => "it is final",
+    }
+}
+
+fn whose(lesson: Option<Seq>) -> String {
+    match lesson {
+        Some(seq) => format!("your lesson at record {seq}"),
+        None => "one of the seeds".to_owned(),
+    }
+}

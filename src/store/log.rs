@@ -1,0 +1,106 @@
+use std::future::Future;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+
+use tokio::sync::oneshot;
+
+use crate::events::{Batch, DecodeError, Durable, Head, HeaderError, Record};
+use crate::ids::{Seq, StreamId, TenantId};
+
+/// The port: one total order per stream, no promise across streams. Any backend passes
+/// `store::conformance`.
+pub trait EventLog: Send + Sync {
+    /// Appends `batch` to `stream` if its head is still `after`. Returns at once; the promise
+    /// resolves when the batch is durable (or certainly not appended).
+    fn append(&self, stream: &StreamId, after: Head, batch: Batch) -> Pending;
+
+    /// The records from `from` on, in order, as they stand now. Each is checked as it is read:
+    /// checksum, dense sequence, chain, decoding. A damaged record is one error, and the last item.
+    fn read<'a>(
+        &'a self,
+        stream: &StreamId,
+        from: Seq,
+    ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError>;
+
+    /// Where the stream ends; [`Head::EMPTY`] for one that does not exist.
+    fn head(&self, stream: &StreamId) -> Result<Head, ReadError>;
+
+    /// The streams of a tenant that have at least one record, in the order of their keys.
+    fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError>;
+}
+
+/// The promise of an append: a future of [`Durable`] or [`AppendError`].
+#[derive(Debug)]
+pub struct Pending(oneshot::Receiver<Result<Durable, AppendError>>);
+
+impl Pending {
+    /// For backends of this room only: the promise and the end that keeps it.
+    pub(super) fn promise() -> (oneshot::Sender<Result<Durable, AppendError>>, Pending) {
+        let (sender, receiver) = oneshot::channel();
+        (sender, Pending(receiver))
+    }
+
+    /// Blocks until the promise is kept; for tools and tests, never inside an actor.
+    pub fn wait(self) -> Result<Durable, AppendError> {
+        self.0.blocking_recv().unwrap_or(Err(AppendError::Gone))
+    }
+}
+
+impl Future for Pending {
+    type Output = Result<Durable, AppendError>;
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let received = Pin::new(&mut self.0).poll(context);
+        received.map(|result| result.unwrap_or(Err(AppendError::Gone)))
+    }
+}
+
+/// Why a batch was not appended, or cannot be known to be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AppendError {
+    #[error(
+        "stream {stream}: expected head {expected}, found {found}; another writer holds this user"
+    )]
+    Conflict {
+        stream: StreamId,
+        expected: u64,
+        found: u64,
+    },
+    /// Retry later: nothing was appended.
+    #[error("the log is busy: {waiting} batches are waiting; try again")]
+    Busy { waiting: usize },
+    /// The log stopped after an I/O error; only a restart helps. The batch may or may not be there.
+    #[error("the log is poisoned and acknowledges nothing until it is restarted: {reason}")]
+    Poisoned { reason: String },
+    #[error("the batch is too large: {reason}")]
+    TooLarge { reason: String },
+    #[error("the person behind this stream was erased")]
+    Erased,
+    /// The committer is gone; the batch may or may not be there.
+    #[error("the log was closed before it answered")]
+    Gone,
+}
+
+/// Why a stream cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReadError {
+    #[error("record {seq}: {error}")]
+    Header { seq: u64, error: HeaderError },
+    #[error("record {seq}: it names {found} as its predecessor, which is {expected}")]
+    Chain {
+        seq: u64,
+        expected: String,
+        found: String,
+    },
+    #[error("expected record {expected}, found {found}: records are missing")]
+    Gap { expected: u64, found: u64 },
+    #[error("record {seq}: its chunks are incomplete: {reason}")]
+    Chunks { seq: u64, reason: String },
+    #[error("record {seq} cannot be opened with this user's key: {reason}")]
+    Seal { seq: u64, reason: String },
+    #[error("record {seq}: {error}")]
+    Decode { seq: u64, error: DecodeError },
+    #[error("the person behind this stream was erased")]
+    Erased,
+    #[error("the store cannot be read: {reason}")]
+    Store { reason: String },
+}

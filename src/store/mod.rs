@@ -1,0 +1,5 @@
+//! Where bytes outlive processes: the ports for durable things, and their adapters.
+
+mod log;
+
+pub use log::{AppendError, EventLog, Pending, ReadError};

@@ -1,0 +1,47 @@
+use std::collections::BTreeMap;
+
+use crate::language::{LiftedProgram, LiftedUtterance, Symbol};
+
+/// What things are called. Shared by a domain's users; people teach requests, not names.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Lexicon {
+    /// From a lower-case name in the singular (`coffee mug`, `bar of soap`) to what it may mean,
+    /// likeliest first.
+    pub names: BTreeMap<String, Vec<Meaning>>,
+    /// From an irregular plural of a name's last word to its singular: `knives` → `knife`.
+    pub plurals: BTreeMap<String, String>,
+    /// Words that stand for something named before: `it`, `them`.
+    pub pronouns: Vec<String>,
+    /// Words before a name that say how it looks or which one it is, and may be swallowed in
+    /// lifting: `red`, `small`, `left`. No state words (`clean`, `cold`, `sliced`), no numbers.
+    pub adjectives: Vec<String>,
+    /// Types whose word is worth keeping beside their slot, with that word: `SinkBasin` → `sink`.
+    pub fixtures: BTreeMap<Symbol, String>,
+}
+
+/// One thing that a name may mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Meaning {
+    pub sort: Symbol,
+    pub kind: Symbol,
+    /// How often recorded people used the name for this type; for breaking ties.
+    pub count: u32,
+}
+
+/// A lifted utterance with its lifted program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seed {
+    pub utterance: LiftedUtterance,
+    pub program: LiftedProgram,
+}
+
+/// What every user starts with, and what the threshold is calibrated on.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SeedSet {
+    /// The exemplars: 44 in the household (paper, Table 1).
+    pub exemplars: Vec<Seed>,
+    /// Variants that no exemplar has, for calibration: an utterance and its right program.
+    pub variants: Vec<Seed>,
+    /// Utterances with verbs that no seed has, for calibration: nothing known is right for them.
+    pub unknown: Vec<LiftedUtterance>,
+}
