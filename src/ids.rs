@@ -14,23 +14,11 @@ pub enum IdError {
     #[error("a {what} must not be empty")]
     Empty { what: &'static str },
     #[error("a {what} has at most {max} bytes, this one has {found}")]
-    TooLong {
-        what: &'static str,
-        max: usize,
-        found: usize,
-    },
+    TooLong { what: &'static str, max: usize, found: usize },
     #[error("a {what} may not contain {found:?}; allowed are {allowed}")]
-    Character {
-        what: &'static str,
-        found: char,
-        allowed: &'static str,
-    },
+    Character { what: &'static str, found: char, allowed: &'static str },
     #[error("{found:?} is no {what}: expected {expected}")]
-    Form {
-        what: &'static str,
-        found: String,
-        expected: &'static str,
-    },
+    Form { what: &'static str, found: String, expected: &'static str },
 }
 
 /// A lab. Lower-case letters, digits and hyphens, 1 to [`limits::TENANT_BYTES_MAX`] bytes.
@@ -50,11 +38,9 @@ impl TenantId {
         check_length("tenant", text, limits::TENANT_BYTES_MAX)?;
         let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         match text.chars().find(|&c| !allowed(c)) {
-            Some(found) => Err(IdError::Character {
-                what: "tenant",
-                found,
-                allowed: "a-z, 0-9 and '-'",
-            }),
+            Some(found) => {
+                Err(IdError::Character { what: "tenant", found, allowed: "a-z, 0-9 and '-'" })
+            }
             None => Ok(TenantId(text.to_owned())),
         }
     }
@@ -94,11 +80,9 @@ impl UserId {
     pub fn new(text: &str) -> Result<Self, IdError> {
         check_length("user", text, limits::USER_BYTES_MAX)?;
         match text.chars().find(|c| c.is_control()) {
-            Some(found) => Err(IdError::Character {
-                what: "user",
-                found,
-                allowed: "printable characters",
-            }),
+            Some(found) => {
+                Err(IdError::Character { what: "user", found, allowed: "printable characters" })
+            }
             None => Ok(UserId(text.to_owned())),
         }
     }
@@ -284,10 +268,7 @@ impl Seq {
     }
 
     pub fn next(self) -> Seq {
-        Seq(self
-            .0
-            .checked_add(1)
-            .expect("a stream never reaches 2^64 records"))
+        Seq(self.0.checked_add(1).expect("a stream never reaches 2^64 records"))
     }
 }
 

@@ -199,8 +199,6 @@ impl EventKind {
     }
 
     pub fn from_number(number: u16) -> Option<EventKind> {
-        EventKind::ALL
-            .into_iter()
-            .find(|kind| *kind as u16 == number)
+        EventKind::ALL.into_iter().find(|kind| *kind as u16 == number)
     }
 }

@@ -19,10 +19,7 @@ pub struct Head {
 }
 
 impl Head {
-    pub const EMPTY: Head = Head {
-        seq: 0,
-        digest: Digest::ZERO,
-    };
+    pub const EMPTY: Head = Head { seq: 0, digest: Digest::ZERO };
 
     pub fn next(&self) -> Seq {
         Seq::new(self.seq + 1).expect("a head's successor is at least 1")
@@ -73,10 +70,7 @@ pub struct Header {
 /// What is wrong with the bytes of a record.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum HeaderError {
-    #[error(
-        "the record has {found} bytes, fewer than a header's {}",
-        Header::BYTES
-    )]
+    #[error("the record has {found} bytes, fewer than a header's {}", Header::BYTES)]
     Short { found: usize },
     #[error("the record does not start with the magic APR1")]
     Magic,
@@ -136,29 +130,14 @@ impl Header {
         let said = u32::from_be_bytes(fields.take()) as usize;
         let said_checksum = u32::from_be_bytes(fields.take());
         if said != sealed.len() {
-            return Err(HeaderError::Length {
-                said,
-                found: sealed.len(),
-            });
+            return Err(HeaderError::Length { said, found: sealed.len() });
         }
         let found = checksum(&head[..Header::BYTES - 4], sealed);
         if found != said_checksum {
-            return Err(HeaderError::Checksum {
-                said: said_checksum,
-                found,
-            });
+            return Err(HeaderError::Checksum { said: said_checksum, found });
         }
         let seq = Seq::new(seq).ok_or(HeaderError::Seq)?;
-        let header = Header {
-            stream,
-            seq,
-            at,
-            request,
-            prev,
-            commitment,
-            kind,
-            version,
-        };
+        let header = Header { stream, seq, at, request, prev, commitment, kind, version };
         Ok((header, sealed, Digest::of(bytes)))
     }
 }
@@ -167,10 +146,7 @@ struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
     fn take<const N: usize>(&mut self) -> [u8; N] {
-        let (field, rest) = self
-            .0
-            .split_first_chunk()
-            .expect("the caller checked the length");
+        let (field, rest) = self.0.split_first_chunk().expect("the caller checked the length");
         self.0 = rest;
         *field
     }

@@ -16,16 +16,9 @@ pub struct Answer {
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// The program was carried out. `bindings[i]` names the things that step `i` acted on.
-    Understood {
-        program: Program,
-        bindings: Vec<Vec<String>>,
-    },
+    Understood { program: Program, bindings: Vec<Vec<String>> },
     /// The words were known and the world forbids it: nothing was carried out. `step` is 0-based.
-    Impossible {
-        program: Program,
-        step: u32,
-        reason: String,
-    },
+    Impossible { program: Program, step: u32, reason: String },
     /// Nothing known is close enough. Nothing was carried out.
     NotSure,
 }

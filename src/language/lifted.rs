@@ -29,10 +29,7 @@ pub struct LiftedUtterance {
 
 impl LiftedUtterance {
     pub fn slots(&self) -> usize {
-        self.words
-            .iter()
-            .filter(|word| matches!(word, Word::Slot { .. }))
-            .count()
+        self.words.iter().filter(|word| matches!(word, Word::Slot { .. })).count()
     }
 
     /// Reads the form that [`fmt::Display`] prints; every `<name>` is a slot of that sort and
@@ -44,16 +41,11 @@ impl LiftedUtterance {
                     Some((sort, fixture)) => (sort, Some(fixture.to_owned())),
                     None => (slot, None),
                 };
-                Word::Slot {
-                    sort: Symbol::new(sort),
-                    fixture,
-                }
+                Word::Slot { sort: Symbol::new(sort), fixture }
             }
             None => Word::Text(word.to_owned()),
         };
-        LiftedUtterance {
-            words: text.split_whitespace().map(read).collect(),
-        }
+        LiftedUtterance { words: text.split_whitespace().map(read).collect() }
     }
 }
 
@@ -61,14 +53,8 @@ impl fmt::Display for Word {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Word::Text(text) => f.write_str(text),
-            Word::Slot {
-                sort,
-                fixture: None,
-            } => write!(f, "<{sort}>"),
-            Word::Slot {
-                sort,
-                fixture: Some(fixture),
-            } => write!(f, "<{sort}={fixture}>"),
+            Word::Slot { sort, fixture: None } => write!(f, "<{sort}>"),
+            Word::Slot { sort, fixture: Some(fixture) } => write!(f, "<{sort}={fixture}>"),
         }
     }
 }
@@ -154,18 +140,9 @@ impl LiftedProgram {
         };
         let fill_step = |step: &LiftedStep| {
             let args = step.args.iter().map(fill_arg).collect::<Option<Vec<_>>>()?;
-            Some(Step {
-                operator: step.operator.clone(),
-                args,
-            })
+            Some(Step { operator: step.operator.clone(), args })
         };
-        Some(Program {
-            steps: self
-                .steps
-                .iter()
-                .map(fill_step)
-                .collect::<Option<Vec<_>>>()?,
-        })
+        Some(Program { steps: self.steps.iter().map(fill_step).collect::<Option<Vec<_>>>()? })
     }
 
     /// The same program with slots renumbered by first use. Two lifted programs are *the same*
@@ -178,10 +155,7 @@ impl LiftedProgram {
                     order.push(*number);
                     order.len() - 1
                 });
-                LiftedArg::Slot {
-                    sort: sort.clone(),
-                    number: place as u8 + 1,
-                }
+                LiftedArg::Slot { sort: sort.clone(), number: place as u8 + 1 }
             }
             other => other.clone(),
         };
@@ -189,18 +163,21 @@ impl LiftedProgram {
             operator: step.operator.clone(),
             args: step.args.iter().map(&mut renumber).collect(),
         });
-        LiftedProgram {
-            steps: steps.collect(),
-        }
+        LiftedProgram { steps: steps.collect() }
     }
+}
+
+/// A lifted utterance and the lifted program it stands for: what the parser compares with.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Exemplar {
+    pub utterance: LiftedUtterance,
+    pub program: LiftedProgram,
 }
 
 impl FromStr for LiftedArg {
     type Err = ProgramError;
     fn from_str(text: &str) -> Result<LiftedArg, ProgramError> {
-        let bad = || ProgramError::BadArgument {
-            found: text.to_owned(),
-        };
+        let bad = || ProgramError::BadArgument { found: text.to_owned() };
         let Some(inner) = text.strip_prefix('<') else {
             return Ok(LiftedArg::Constant(Symbol::new(text)));
         };
@@ -210,10 +187,7 @@ impl FromStr for LiftedArg {
         }
         let (sort, number) = inner.split_once(':').ok_or_else(bad)?;
         match number.parse() {
-            Ok(number) if number >= 1 => Ok(LiftedArg::Slot {
-                sort: Symbol::new(sort),
-                number,
-            }),
+            Ok(number) if number >= 1 => Ok(LiftedArg::Slot { sort: Symbol::new(sort), number }),
             _ => Err(bad()),
         }
     }
@@ -225,19 +199,14 @@ impl FromStr for LiftedStep {
         let mut words = text.split_whitespace();
         let operator = words.next().ok_or(ProgramError::EmptyStep { step: 1 })?;
         let args = words.map(str::parse).collect::<Result<_, _>>()?;
-        Ok(LiftedStep {
-            operator: Symbol::new(operator),
-            args,
-        })
+        Ok(LiftedStep { operator: Symbol::new(operator), args })
     }
 }
 
 impl FromStr for LiftedProgram {
     type Err = ProgramError;
     fn from_str(text: &str) -> Result<LiftedProgram, ProgramError> {
-        Ok(LiftedProgram {
-            steps: parse_steps(text)?,
-        })
+        Ok(LiftedProgram { steps: parse_steps(text)? })
     }
 }
 
@@ -273,9 +242,7 @@ mod tests {
     #[test]
     fn a_lifted_program_is_filled_by_mention() {
         let lifted: LiftedProgram =
-            "GOTO <obj:2>; PUT <obj:1> <obj:2>; OPEN Fridge; PUT <held> Fridge"
-                .parse()
-                .unwrap();
+            "GOTO <obj:2>; PUT <obj:1> <obj:2>; OPEN Fridge; PUT <held> Fridge".parse().unwrap();
         let mentioned = [Symbol::new("Mug"), Symbol::new("DiningTable")];
         let held = Symbol::new("Pan");
         assert_eq!(

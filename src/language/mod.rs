@@ -10,7 +10,7 @@ mod utterance;
 
 pub use answer::{Answer, Discarded, Evidence, Near, Outcome};
 pub use document::Document;
-pub use lifted::{LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Mention, Word};
+pub use lifted::{Exemplar, LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Mention, Word};
 pub use program::{Program, ProgramError, Step};
 pub use signature::{Operator, Signature};
 pub use symbol::Symbol;

@@ -39,10 +39,7 @@ impl FromStr for Step {
     fn from_str(text: &str) -> Result<Step, ProgramError> {
         let mut words = text.split_whitespace().map(Symbol::new);
         let operator = words.next().ok_or(ProgramError::EmptyStep { step: 1 })?;
-        Ok(Step {
-            operator,
-            args: words.collect(),
-        })
+        Ok(Step { operator, args: words.collect() })
     }
 }
 
@@ -135,9 +132,6 @@ mod tests {
         assert_eq!(error, ProgramError::EmptyStep { step: 2 });
         assert_eq!("".parse::<Program>().unwrap_err(), ProgramError::Empty);
         let long = "GOTO A;".repeat(PROGRAM_STEPS_MAX + 1);
-        assert!(matches!(
-            long.parse::<Program>(),
-            Err(ProgramError::TooLong { .. })
-        ));
+        assert!(matches!(long.parse::<Program>(), Err(ProgramError::TooLong { .. })));
     }
 }

@@ -118,9 +118,7 @@ mod tests {
     fn words_and_clause_marks_are_kept() {
         assert_eq!(
             tokens("Pick up the Mug, then DON'T wash-it."),
-            [
-                "pick", "up", "the", "mug", ",", "then", "don't", "wash", "it", "."
-            ]
+            ["pick", "up", "the", "mug", ",", "then", "don't", "wash", "it", "."]
         );
     }
 
@@ -128,20 +126,11 @@ mod tests {
     fn bad_utterances_get_one_clear_sentence() {
         assert_eq!(Utterance::new("  "), Err(UtteranceError::Empty));
         assert_eq!(Utterance::new("🤖 !!"), Err(UtteranceError::NoWords));
-        assert!(matches!(
-            Utterance::new("a\u{0}b"),
-            Err(UtteranceError::Control { .. })
-        ));
+        assert!(matches!(Utterance::new("a\u{0}b"), Err(UtteranceError::Control { .. })));
         let long = "go ".repeat(10_000);
-        assert!(matches!(
-            Utterance::new(&long),
-            Err(UtteranceError::TooManyBytes { .. })
-        ));
+        assert!(matches!(Utterance::new(&long), Err(UtteranceError::TooManyBytes { .. })));
         let wordy = "go ".repeat(200);
-        assert!(matches!(
-            Utterance::new(&wordy),
-            Err(UtteranceError::TooManyWords { found: 200 })
-        ));
+        assert!(matches!(Utterance::new(&wordy), Err(UtteranceError::TooManyWords { found: 200 })));
         assert!(Utterance::new("wash the <b>mug</b> 🍵").is_ok());
     }
 }

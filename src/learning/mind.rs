@@ -1,6 +1,6 @@
 use crate::grounding::Moment;
 use crate::ids::Digest;
-use crate::language::{Answer, LiftedProgram, LiftedUtterance, Utterance};
+use crate::language::{Answer, Exemplar, Utterance};
 use crate::learning::{Lesson, Recipe, Report, TrainError};
 use crate::world::Domain;
 
@@ -33,7 +33,7 @@ impl Mind {
         unimplemented!()
     }
     /// Seeds first, then lessons in order; the lesson's index is 0-based.
-    pub fn exemplars(&self) -> Vec<(LiftedUtterance, LiftedProgram, Option<usize>)> {
+    pub fn exemplars(&self) -> Vec<(Exemplar, Option<usize>)> {
         unimplemented!()
     }
     /// Another program that the lesson's lifted form already stands for: the exemplar's number.
@@ -49,8 +49,7 @@ impl Mind {
 /// What a new lesson collides with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clash {
-    pub utterance: LiftedUtterance,
-    pub program: LiftedProgram,
+    pub exemplar: Exemplar,
     /// The 0-based index of the old lesson; none for a seed.
     pub lesson: Option<usize>,
 }

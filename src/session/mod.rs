@@ -7,4 +7,4 @@ mod reply;
 
 pub use command::{Command, OnClash, Query};
 pub use rejection::{Rejection, RejectionCode};
-pub use reply::{ActionView, Exemplar, Phase, Reply, Status, Teachable, Told};
+pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told};

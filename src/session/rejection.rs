@@ -35,21 +35,13 @@ pub enum Rejection {
         "action {first} came before \"{utterance}\" was said; choose from action {} on",
         before + 1
     )]
-    NotAfter {
-        first: u32,
-        before: u32,
-        utterance: String,
-    },
+    NotAfter { first: u32, before: u32, utterance: String },
     /// The same lifted form, or one that would swallow it, is taken by another program.
     #[error(
         "\"{utterance}\" is already known as {known} ({}); replace it, keep both, or cancel",
         whose(*lesson)
     )]
-    Clash {
-        utterance: LiftedUtterance,
-        known: Program,
-        lesson: Option<Seq>,
-    },
+    Clash { utterance: LiftedUtterance, known: Program, lesson: Option<Seq> },
     #[error("there is no live lesson at record {lesson}")]
     NoSuchLesson { lesson: Seq },
     #[error("{LESSONS_MAX} lessons are kept at most; forget one first")]

@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::events::{Ending, Report};
 use crate::ids::{Digest, Seq};
-use crate::language::{Answer, LiftedProgram, LiftedUtterance, Program};
+use crate::language::{Answer, Exemplar, Program};
 
 /// What a command led to. Computed from the recorded events alone, so a repeated request gets the
 /// same reply from the log.
@@ -129,9 +129,8 @@ pub struct Teachable {
 
 /// One exemplar of the present mind, for [`super::Query::Known`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Exemplar {
-    pub utterance: LiftedUtterance,
-    pub program: LiftedProgram,
+pub struct KnownExemplar {
+    pub exemplar: Exemplar,
     /// The lesson it comes from; none for a seed.
     pub lesson: Option<Seq>,
 }

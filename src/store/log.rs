@@ -60,11 +60,7 @@ pub enum AppendError {
     #[error(
         "stream {stream}: expected head {expected}, found {found}; another writer holds this user"
     )]
-    Conflict {
-        stream: StreamId,
-        expected: u64,
-        found: u64,
-    },
+    Conflict { stream: StreamId, expected: u64, found: u64 },
     /// Retry later: nothing was appended.
     #[error("the log is busy: {waiting} batches are waiting; try again")]
     Busy { waiting: usize },
@@ -86,11 +82,7 @@ pub enum ReadError {
     #[error("record {seq}: {error}")]
     Header { seq: u64, error: HeaderError },
     #[error("record {seq}: it names {found} as its predecessor, which is {expected}")]
-    Chain {
-        seq: u64,
-        expected: String,
-        found: String,
-    },
+    Chain { seq: u64, expected: String, found: String },
     #[error("expected record {expected}, found {found}: records are missing")]
     Gap { expected: u64, found: u64 },
     #[error("record {seq}: its chunks are incomplete: {reason}")]

@@ -108,23 +108,11 @@ pub enum Stage {
 pub enum StageError {
     /// `known` lists what would have been understood.
     #[error("cannot set the task {task:?}: {reason}; {known}")]
-    Task {
-        task: String,
-        reason: String,
-        known: String,
-    },
+    Task { task: String, reason: String, known: String },
     #[error("the scene file has an error at line {line}, column {column}: {reason}")]
-    Scene {
-        line: usize,
-        column: usize,
-        reason: String,
-    },
+    Scene { line: usize, column: usize, reason: String },
     #[error("no scene drawn from seed {seed} makes the task {task:?} possible: {reason}")]
-    Unsolvable {
-        task: String,
-        seed: u64,
-        reason: String,
-    },
+    Unsolvable { task: String, seed: u64, reason: String },
 }
 
 /// Why a step cannot be carried out: a sentence that names the object and the reason.

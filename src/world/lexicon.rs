@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use crate::language::{LiftedProgram, LiftedUtterance, Symbol};
+use crate::language::{Exemplar, LiftedUtterance, Symbol};
 
 /// What things are called. Shared by a domain's users; people teach requests, not names.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -28,20 +28,13 @@ pub struct Meaning {
     pub count: u32,
 }
 
-/// A lifted utterance with its lifted program.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Seed {
-    pub utterance: LiftedUtterance,
-    pub program: LiftedProgram,
-}
-
 /// What every user starts with, and what the threshold is calibrated on.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SeedSet {
     /// The exemplars: 44 in the household (paper, Table 1).
-    pub exemplars: Vec<Seed>,
+    pub exemplars: Vec<Exemplar>,
     /// Variants that no exemplar has, for calibration: an utterance and its right program.
-    pub variants: Vec<Seed>,
+    pub variants: Vec<Exemplar>,
     /// Utterances with verbs that no seed has, for calibration: nothing known is right for them.
     pub unknown: Vec<LiftedUtterance>,
 }

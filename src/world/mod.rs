@@ -6,4 +6,4 @@ pub mod household;
 mod lexicon;
 
 pub use domain::{Domain, Infeasible, Stage, StageError, Thing, View};
-pub use lexicon::{Lexicon, Meaning, Seed, SeedSet};
+pub use lexicon::{Lexicon, Meaning, SeedSet};
