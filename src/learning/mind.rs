@@ -61,3 +61,11 @@ pub fn train<D: Domain>(
 ) -> Result<Mind, TrainError> {
     unimplemented!()
 }
+
+pub fn lift<D: Domain>(
+    _domain: &D,
+    _recipe: &Recipe,
+    _lesson: &Lesson<D::Scene, D::Task>,
+) -> Exemplar {
+    unimplemented!()
+}

@@ -5,5 +5,5 @@ mod mind;
 mod recipe;
 
 pub use lesson::Lesson;
-pub use mind::{Clash, Mind, train};
+pub use mind::{Clash, Mind, lift, train};
 pub use recipe::{Recipe, RecipeError, Report, TrainError};
