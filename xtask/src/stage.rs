@@ -62,7 +62,7 @@ fn docs() -> Result<(), String> {
 /// Advisories need a database that not every machine can reach: by hand, see `deny.toml`.
 fn licences() -> Result<(), String> {
     machine::cargo_deny()?;
-    run("cargo", &["deny", "--offline", "check", "licenses", "bans", "sources"])
+    run("cargo", &["deny", "check", "licenses", "bans", "sources"])
 }
 
 /// Runs the benchmarks.
