@@ -61,6 +61,8 @@ pub const COMMIT_GROUP_MAX: usize = 512;
 pub const MAILBOX_MAX: usize = 32;
 /// Users awake at once; the longest idle one goes to sleep.
 pub const AWAKE_USERS_MAX: usize = 10_000;
+/// Minds kept in memory, over all tenants; a mind has some hundred kilobytes.
+pub const MINDS_IN_MEMORY_MAX: usize = 512;
 /// Trainings waiting for a trainer.
 pub const TRAIN_QUEUE_MAX: usize = 1_024;
 /// Bytes of one wire frame.
