@@ -45,17 +45,24 @@ pub const CLIENT_IN_FLIGHT_MAX: usize = 64;
 /// Seconds during which a client retries a request.
 pub const CLIENT_RETRY_S_MAX: u64 = 60;
 
-/// Bytes of one `sled` value. Larger values go to blob files that are never fsynced
-/// (docs/adr: group commit), so anything larger is chunked.
-pub const STORE_VALUE_BYTES_MAX: usize = 8 * 1024;
+/// Bytes of one `sled` value. `sled` writes a page above 128 kB to a blob file that it never
+/// syncs, and a page holds up to 20 values: values of 8 kB do become blobs (a test of `store/`
+/// shows it), values of 4 kB cannot. Anything larger is chunked.
+pub const STORE_VALUE_BYTES_MAX: usize = 4 * 1024;
 /// Bytes of one record's body before sealing.
 pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
 /// Events of one batch: one command's worth.
 pub const BATCH_EVENTS_MAX: usize = 16;
+/// Bytes of one batch's bodies before sealing.
+pub const BATCH_BYTES_MAX: usize = 8 * 1024 * 1024;
 /// Batches waiting for the committer; then an append is refused as busy.
 pub const COMMIT_QUEUE_MAX: usize = 4_096;
+/// Bytes of the batches waiting for the committer; then an append is refused as busy.
+pub const COMMIT_QUEUE_BYTES_MAX: usize = 64 * 1024 * 1024;
 /// Batches flushed together.
 pub const COMMIT_GROUP_MAX: usize = 512;
+/// Bytes of the batches flushed together; a group ends with the batch that reaches it.
+pub const COMMIT_GROUP_BYTES_MAX: usize = 8 * 1024 * 1024;
 
 /// Messages waiting in one user's mailbox; then an honest `Busy`.
 pub const MAILBOX_MAX: usize = 32;
@@ -77,5 +84,7 @@ const _: () = {
     assert!(UTTERANCE_BYTES_MAX < FRAME_BYTES_MAX);
     assert!(SCENE_FILE_BYTES_MAX < FRAME_BYTES_MAX);
     assert!(COMMIT_GROUP_MAX <= COMMIT_QUEUE_MAX);
+    assert!(RECORD_BYTES_MAX <= BATCH_BYTES_MAX);
+    assert!(BATCH_BYTES_MAX <= COMMIT_QUEUE_BYTES_MAX);
     assert!(PROGRAM_STEPS_MAX <= EPISODE_ACTIONS_MAX);
 };

@@ -1,0 +1,392 @@
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::cache::{Cache, MemoryCache};
+use super::files::{make_dir, sync_dir, write_whole};
+use super::sled::{LogError, SledCache};
+use super::{
+    Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog, SnapshotStore,
+};
+use crate::ids::{StreamId, TenantId};
+
+/// The layout of data directories that this binary makes and reads.
+pub const LAYOUT: u32 = 1;
+
+const LAYOUT_FILE: &str = "LAYOUT";
+const LAYOUT_TEXT: &str = "apprentice data directory, layout ";
+const LOCK_FILE: &str = "LOCK";
+/// Stands while a directory is being made; nothing was acknowledged yet.
+const CREATING_FILE: &str = "CREATING";
+
+/// Everything durable that a service needs.
+#[derive(Clone)]
+pub struct Store {
+    pub log: Arc<dyn EventLog>,
+    pub models: Arc<ModelStore>,
+    pub snapshots: Arc<SnapshotStore>,
+    pub keys: Arc<Keys>,
+}
+
+/// Why a data directory cannot be opened: a sentence that names it and says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    #[error(
+        "the data directory {dir} is in use by another process; \
+         stop that one, or choose another directory"
+    )]
+    InUse { dir: String },
+    #[error("the data directory {dir} cannot be used: {path}: {reason}")]
+    Io { dir: String, path: String, reason: String },
+    #[error(
+        "{dir} is not a data directory of apprentice: it holds {found} and no file LAYOUT; \
+         choose a new or empty directory, or restore the file from a backup"
+    )]
+    NotOurs { dir: String, found: String },
+    #[error(
+        "the data directory {dir} has layout {found}, this version of apprentice knows {LAYOUT}; \
+         use a newer version"
+    )]
+    Newer { dir: String, found: u32 },
+    #[error("the file LAYOUT of the data directory {dir} is damaged; restore it from a backup")]
+    Layout { dir: String },
+    #[error("the data directory {dir}: {error}")]
+    Key { dir: String, error: KeyError },
+    #[error(
+        "the database in the data directory {dir} is damaged and does not open ({reason}); \
+         restore the directory from a backup"
+    )]
+    Database { dir: String, reason: String },
+    #[error(
+        "the data directory {dir} has lost records: {}; restore it from a backup",
+        list(damage)
+    )]
+    Damaged { dir: String, damage: Vec<Damage> },
+}
+
+fn list(damage: &[Damage]) -> String {
+    let mut shown: Vec<String> = damage.iter().take(3).map(Damage::to_string).collect();
+    if damage.len() > shown.len() {
+        shown.push(format!("and {} more", damage.len() - shown.len()));
+    }
+    shown.join("; ")
+}
+
+/// Opens the data directory `dir`, and makes it if it does not exist or is empty. One process may
+/// have it open at a time.
+pub fn open(dir: &Path) -> Result<Store, OpenError> {
+    let fail = Fail(dir);
+    make_dir(dir).map_err(|error| fail.io(dir, &error))?;
+    let lock = Arc::new(take_lock(dir)?);
+    let fresh = is_fresh(dir)?;
+    if fresh {
+        write_durably(&dir.join(CREATING_FILE), "").map_err(|e| fail.io(dir, &e))?;
+    }
+    let keys = Keys::open(&dir.join("keys"), Arc::new(OsEntropy)).map_err(|e| fail.key(e))?;
+    let keys = Arc::new(keys);
+    let log = open_log(dir, keys.clone(), fresh, lock.clone())?;
+    let local = TenantId::local();
+    let local_is_empty = log.streams(&local).is_ok_and(|streams| streams.is_empty());
+    if local_is_empty {
+        keys.make_tenant(&local).map_err(|error| fail.key(error))?;
+    }
+    log.tenants()
+        .iter()
+        .try_for_each(|tenant| keys.check_tenant(tenant))
+        .map_err(|e| fail.key(e))?;
+    let cache =
+        SledCache::open(&dir.join("cache"), lock).map_err(|reason| fail.database(reason))?;
+    if fresh {
+        let layout = dir.join(LAYOUT_FILE);
+        write_durably(&layout, &format!("{LAYOUT_TEXT}{LAYOUT}\n"))
+            .and_then(|()| fs::remove_file(dir.join(CREATING_FILE)))
+            .and_then(|()| sync_dir(dir))
+            .map_err(|error| fail.io(&layout, &error))?;
+    }
+    Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
+}
+
+/// A store that ends with the process, for tests and for embedding without a disk.
+pub fn open_memory() -> Store {
+    let keys = Arc::new(Keys::in_memory(Arc::new(OsEntropy)));
+    let log = Arc::new(MemoryLog::new(keys.clone()));
+    Store::of(log, Arc::new(MemoryCache::default()), keys)
+}
+
+impl Store {
+    fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
+        let models = Arc::new(ModelStore::new(cache.clone(), keys.clone()));
+        let snapshots = Arc::new(SnapshotStore::new(cache, keys.clone()));
+        Store { log, models, snapshots, keys }
+    }
+
+    /// In memory, around another log (a [`super::FaultyLog`], a seeded one).
+    pub fn around(log: Arc<dyn EventLog>, keys: Arc<Keys>) -> Store {
+        Store::of(log, Arc::new(MemoryCache::default()), keys)
+    }
+
+    /// Destroys a person's key and drops their minds and snapshots. The chains still verify.
+    ///
+    /// - errors: why the key could not be destroyed. What is left in a cache is noise without it.
+    pub fn erase(&self, stream: &StreamId) -> Result<(), KeyError> {
+        self.keys.erase_user_key(stream)?;
+        for dropped in [self.models.keep_only(stream, &[]), self.snapshots.forget(stream)] {
+            if let Err(reason) = dropped {
+                tracing::warn!(%stream, %reason, "an erased person's cache is left as noise");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Opens the log of `dir` and translates its errors.
+pub(super) fn open_log(
+    dir: &Path,
+    keys: Arc<Keys>,
+    fresh: bool,
+    lock: Arc<File>,
+) -> Result<SledLog, OpenError> {
+    let fail = Fail(dir);
+    SledLog::open(dir, keys, fresh, lock).map_err(|error| match error {
+        LogError::Io(error) => fail.io(&dir.join("log"), &error),
+        LogError::Database(reason) => fail.database(reason),
+        LogError::Damaged(damage) => OpenError::Damaged { dir: fail.dir(), damage },
+    })
+}
+
+fn take_lock(dir: &Path) -> Result<File, OpenError> {
+    let path = dir.join(LOCK_FILE);
+    let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+    let file = opened.map_err(|error| Fail(dir).io(&path, &error))?;
+    lock(dir, file)
+}
+
+/// Locks an opened lock file, or says who is in the way.
+pub(super) fn lock(dir: &Path, file: File) -> Result<File, OpenError> {
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(OpenError::InUse { dir: dir.display().to_string() }),
+        Err(TryLockError::Error(error)) => Err(Fail(dir).io(&dir.join(LOCK_FILE), &error)),
+    }
+}
+
+/// For tools that never make a directory: locks an existing one and checks its layout.
+pub(super) fn lock_existing(dir: &Path) -> Result<File, OpenError> {
+    let path = dir.join(LOCK_FILE);
+    let file = File::open(&path).map_err(|error| Fail(dir).io(&path, &error))?;
+    let file = lock(dir, file)?;
+    match is_fresh(dir)? {
+        false => Ok(file),
+        true => {
+            let found = "nothing that was ever used".to_owned();
+            Err(OpenError::NotOurs { dir: Fail(dir).dir(), found })
+        }
+    }
+}
+
+/// Whether the directory is still to be made.
+///
+/// - errors: it belongs to somebody else, or to a newer version.
+fn is_fresh(dir: &Path) -> Result<bool, OpenError> {
+    let fail = Fail(dir);
+    if dir.join(CREATING_FILE).exists() {
+        return Ok(true);
+    }
+    let path = dir.join(LAYOUT_FILE);
+    match fs::read(&path) {
+        Ok(bytes) => {
+            let text = std::str::from_utf8(&bytes).ok().and_then(|text| text.strip_suffix('\n'));
+            let number = text.and_then(|text| text.strip_prefix(LAYOUT_TEXT)?.parse().ok());
+            match number {
+                Some(LAYOUT) => Ok(false),
+                Some(found) if found > LAYOUT => Err(OpenError::Newer { dir: fail.dir(), found }),
+                _ => Err(OpenError::Layout { dir: fail.dir() }),
+            }
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let entries = fs::read_dir(dir).map_err(|error| fail.io(dir, &error))?;
+            for entry in entries {
+                let name = entry.map_err(|error| fail.io(dir, &error))?.file_name();
+                // A crash right at the start leaves these two.
+                if name != LOCK_FILE && name != "CREATING.new" {
+                    let found = format!("{:?}", name.to_string_lossy());
+                    return Err(OpenError::NotOurs { dir: fail.dir(), found });
+                }
+            }
+            Ok(true)
+        }
+        Err(error) => Err(fail.io(&path, &error)),
+    }
+}
+
+fn write_durably(path: &Path, text: &str) -> io::Result<()> {
+    write_whole(path, text.as_bytes())?;
+    sync_dir(path.parent().expect("a file of the data directory stands in it"))
+}
+
+struct Fail<'a>(&'a Path);
+
+impl Fail<'_> {
+    fn dir(&self) -> String {
+        self.0.display().to_string()
+    }
+
+    fn io(&self, path: &Path, error: &io::Error) -> OpenError {
+        let (path, reason) = (path.display().to_string(), error.to_string());
+        OpenError::Io { dir: self.dir(), path, reason }
+    }
+
+    fn key(&self, error: KeyError) -> OpenError {
+        OpenError::Key { dir: self.dir(), error }
+    }
+
+    fn database(&self, reason: String) -> OpenError {
+        OpenError::Database { dir: self.dir(), reason }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance::{batch, read_all, stream};
+    use super::*;
+    use crate::events::Head;
+
+    fn refusal(dir: &Path) -> String {
+        match open(dir) {
+            Err(error) => error.to_string(),
+            Ok(_) => panic!("{} was opened", dir.display()),
+        }
+    }
+
+    /// A directory with one record of one person of tenant `local`.
+    fn used() -> (tempfile::TempDir, StreamId) {
+        let dir = tempfile::tempdir().unwrap();
+        let store = open(dir.path()).unwrap();
+        let ada = stream(&store.keys, "local", "ada");
+        store.log.append(&ada, Head::EMPTY, batch(["a"])).wait().unwrap();
+        (dir, ada)
+    }
+
+    #[test]
+    fn a_directory_is_made_and_opened_again() {
+        let parent = tempfile::tempdir().unwrap();
+        let dir = parent.path().join("deep/er");
+        for _ in 0..2 {
+            open(&dir).unwrap();
+        }
+        let layout = fs::read_to_string(dir.join("LAYOUT")).unwrap();
+        assert_eq!(layout, "apprentice data directory, layout 1\n");
+        assert!(!dir.join("CREATING").exists());
+        assert!(dir.join("keys/local.key").exists());
+    }
+
+    #[test]
+    fn a_directory_in_use_is_refused_until_the_last_handle_is_gone() {
+        let (dir, _) = used();
+        let store = open(dir.path()).unwrap();
+        let error = refusal(dir.path());
+        assert!(error.contains("in use by another process"), "{error}");
+        assert!(error.contains(&dir.path().display().to_string()), "{error}");
+        assert!(copy_refused(dir.path()).contains("in use"));
+        let log = store.log.clone();
+        drop(store);
+        assert!(refusal(dir.path()).contains("in use"), "the log is still open");
+        drop(log);
+        open(dir.path()).unwrap();
+    }
+
+    fn copy_refused(dir: &Path) -> String {
+        super::super::copy_private(dir).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_no_data_directory_is_left_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("thesis.tex"), "...").unwrap();
+        assert!(refusal(dir.path()).contains("thesis.tex"));
+        let file = dir.path().join("thesis.tex");
+        assert!(refusal(&file).contains("cannot be used"));
+        assert!(copy_refused(&file).contains("cannot be used"));
+        let empty = tempfile::tempdir().unwrap();
+        assert!(copy_refused(empty.path()).contains("cannot be used"));
+        assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_layout_that_is_newer_or_damaged_is_refused() {
+        let (dir, _) = used();
+        for (text, part) in [
+            ("apprentice data directory, layout 2\n", "use a newer version"),
+            ("apprentice data directory, layout 1", "is damaged"),
+            ("apprentice data directory, layout 0\n", "is damaged"),
+            ("\u{0}", "is damaged"),
+        ] {
+            fs::write(dir.path().join("LAYOUT"), text).unwrap();
+            let error = refusal(dir.path());
+            assert!(error.contains(part), "{error}");
+        }
+        fs::remove_file(dir.path().join("LAYOUT")).unwrap();
+        assert!(refusal(dir.path()).contains("no file LAYOUT"));
+    }
+
+    #[test]
+    fn a_directory_whose_making_was_cut_short_is_made_again() {
+        let dir = tempfile::tempdir().unwrap();
+        drop(open(dir.path()).unwrap());
+        fs::remove_file(dir.path().join("LAYOUT")).unwrap();
+        fs::write(dir.path().join("CREATING"), "").unwrap();
+        drop(open(dir.path()).unwrap());
+        assert!(dir.path().join("LAYOUT").exists() && !dir.path().join("CREATING").exists());
+    }
+
+    #[test]
+    fn a_lost_tenant_key_is_never_replaced_by_a_new_one() {
+        let (dir, _) = used();
+        let path = dir.path().join("keys/local.key");
+        let key = fs::read(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        let error = refusal(dir.path());
+        assert!(error.contains("local.key") && error.contains("backup"), "{error}");
+        assert!(!path.exists());
+        write_whole(&path, &key).unwrap();
+        open(dir.path()).unwrap();
+    }
+
+    #[test]
+    fn a_damaged_cache_is_thrown_away() {
+        let (dir, ada) = used();
+        fs::write(dir.path().join("cache/db"), "this is no database").unwrap();
+        let store = open(dir.path()).unwrap();
+        assert_eq!(read_all(&*store.log, &ada).len(), 1);
+    }
+
+    #[test]
+    fn a_private_copy_shows_the_same_records_and_leaves_no_trace() {
+        let (dir, ada) = used();
+        let before = read_all(&*open(dir.path()).unwrap().log, &ada);
+        let listing = || {
+            let mut all = Vec::new();
+            let mut waiting = vec![dir.path().to_owned()];
+            while let Some(path) = waiting.pop() {
+                match path.is_dir() {
+                    true => waiting
+                        .extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path())),
+                    false => all.push((path.clone(), fs::read(&path).unwrap())),
+                }
+            }
+            all.sort();
+            all
+        };
+        let untouched = listing();
+        let copy = super::super::copy_private(dir.path()).unwrap();
+        let store = copy.open().unwrap();
+        assert_eq!(read_all(&*store.log, &ada), before);
+        let eve = StreamId { key: crate::ids::StreamKey([3; 16]), ..ada.clone() };
+        let refused = store.log.append(&eve, Head::EMPTY, batch(["new here"])).wait();
+        assert!(refused.is_err());
+        assert_eq!(listing(), untouched);
+        // The copy is no lock on the original.
+        open(dir.path()).unwrap();
+    }
+}
