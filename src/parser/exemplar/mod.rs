@@ -163,7 +163,9 @@ impl SemanticParser for ExemplarParser {
         let mut candidates: Vec<Scored> = Vec::new();
         for (number, distance) in ordered {
             let program = &self.exemplars[number as usize].program;
-            if candidates.len() < CANDIDATES_MAX
+            // A program with more slots than there are mentions can never be filled.
+            if program.slots() <= lifted.slots()
+                && candidates.len() < CANDIDATES_MAX
                 && candidates.iter().all(|known| known.program != *program)
             {
                 candidates.push(Scored { program: program.clone(), distance, number });

@@ -1,9 +1,13 @@
+use std::collections::BTreeSet;
+
 use super::{Calibration, ExemplarParser, ExemplarSettings, Figures, ThresholdReading};
-use crate::language::{LiftedProgram, LiftedUtterance};
+use crate::language::{Exemplar, LiftedProgram, LiftedUtterance};
 
 /// One comparison that the threshold would accept from `distance` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Trial {
+    /// The exemplar.
+    number: u32,
     distance: f32,
     right: bool,
 }
@@ -21,8 +25,19 @@ pub(super) fn calibrate(
         .iter()
         .map(|variant| trials(parser, &variant.utterance, Some(&variant.program)))
         .collect();
-    let unknown_trials: Vec<Vec<Trial>> =
-        unknown.iter().map(|utterance| trials(parser, utterance, None)).collect();
+    // Nobody asked what an unknown request means, only that the programs of the variants are no
+    // answer. Where a lesson is nearest, neither right nor wrong is known: it may be what the
+    // person taught. Counting it as wrong would narrow the threshold with every lesson.
+    let answered: BTreeSet<LiftedProgram> =
+        variants.iter().map(|variant| variant.program.canonical()).collect();
+    let unknown_trials: Vec<Vec<Trial>> = unknown
+        .iter()
+        .map(|utterance| trials(parser, utterance, None))
+        .filter(|trials| {
+            let program = |trial: &Trial| &parser.exemplars[trial.number as usize].program;
+            trials.first().is_some_and(|trial| answered.contains(&program(trial).canonical()))
+        })
+        .collect();
     // Trials are sorted: the first is the nearest exemplar, whose program would be the answer.
     let first = |trials: &[Vec<Trial>]| -> Vec<Trial> {
         trials.iter().filter_map(|trials| trials.first().copied()).collect()
@@ -62,7 +77,7 @@ pub(super) fn calibrate(
 /// Notes the share of exemplars whose nearest exemplar, the shortcut for exact forms aside, gives
 /// their own program: below 1 only where different programs look alike without stop words.
 pub(super) fn measure(parser: &ExemplarParser, figures: &mut Figures) {
-    let recalled = |exemplar: &&crate::language::Exemplar| {
+    let recalled = |exemplar: &&Exemplar| {
         let trials = trials(parser, &exemplar.utterance, Some(&exemplar.program));
         trials.first().is_some_and(|trial| trial.right)
     };
@@ -77,12 +92,15 @@ fn trials(
     utterance: &LiftedUtterance,
     program: Option<&LiftedProgram>,
 ) -> Vec<Trial> {
+    let slots = utterance.slots();
     let near = parser.index.near(&parser.embed(utterance), 0.0, parser.exemplars.len());
     let trial = |(number, distance): (u32, f32)| {
-        let right = program == Some(&parser.exemplars[number as usize].program);
-        Trial { distance, right }
+        let found = &parser.exemplars[number as usize].program;
+        let right = program == Some(found);
+        // What the utterance's mentions cannot fill is never a candidate.
+        (found.slots() <= slots).then_some(Trial { number, distance, right })
     };
-    near.into_iter().map(trial).collect()
+    near.into_iter().filter_map(trial).collect()
 }
 
 /// The largest distance at which at least `precision` of the trials within it are right.
@@ -120,7 +138,7 @@ mod tests {
     fn trials(text: &str) -> Vec<Trial> {
         let trial = |word: &str| {
             let (distance, right) = (word.trim_end_matches(['+', '-']), word.ends_with('+'));
-            Trial { distance: distance.parse().unwrap(), right }
+            Trial { number: 0, distance: distance.parse().unwrap(), right }
         };
         text.split_whitespace().map(trial).collect()
     }
