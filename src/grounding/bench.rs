@@ -136,7 +136,7 @@ impl Domain for Bench {
 
     fn step(&self, scene: &mut Scene, _: &(), step: &Step) -> Result<Vec<String>, Infeasible> {
         let thing = &step.args[0];
-        let refuse = |reason: String| Err(Infeasible { reason });
+        let refuse = |reason: String| Err(Infeasible { reason, first: None });
         let present = scene.here.contains(thing) || scene.held.as_ref() == Some(thing);
         if step.operator == "GO" {
             if !present && !scene.far.remove(thing) {
@@ -146,7 +146,8 @@ impl Domain for Bench {
             return Ok(vec![thing.to_string()]);
         }
         if scene.far.contains(thing) {
-            return refuse(format!("the {thing} is too far away"));
+            let first = Some(format!("GO {thing}").parse().unwrap());
+            return Err(Infeasible { reason: format!("the {thing} is too far away"), first });
         }
         if !present {
             return refuse(format!("there is no {thing}"));
@@ -256,7 +257,7 @@ impl SemanticParser for Overlap {
             let mut rest = other.clone();
             let mut take =
                 |word| rest.iter().position(|other| other == word).map(|place| rest.remove(place));
-            let shared = words.iter().filter_map(|word| take(word)).count();
+            let shared = words.iter().filter_map(&mut take).count();
             let distance = if *other == *words {
                 0.0
             } else {

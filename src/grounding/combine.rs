@@ -199,10 +199,16 @@ impl<D: Domain> Ground<'_, D> {
             }
             let refused = |reason| ((before + index) as u32, reason);
             domain.signature().check(step).map_err(refused)?;
-            let bound =
-                domain.step(scene, task, step).map_err(|refusal| refused(refusal.reason))?;
+            let done = domain.step(scene, task, step).or_else(|refusal| {
+                let first = refusal.first.as_ref().filter(|_| self.execution.approach);
+                let Some(first) = first else { return Err(refusal) };
+                let bound = domain.step(scene, task, first)?;
+                steps.push(first.clone());
+                bindings.push(bound);
+                domain.step(scene, task, step)
+            });
+            bindings.push(done.map_err(|refusal| refused(refusal.reason))?);
             steps.push(step.clone());
-            bindings.push(bound);
         }
         Ok(())
     }

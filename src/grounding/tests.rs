@@ -258,6 +258,16 @@ fn turning_off_what_is_off_is_impossible_where_the_recipe_minds() {
 }
 
 #[test]
+fn the_way_to_a_far_thing_is_taken_unasked_where_the_recipe_says_so() {
+    let mut talk = Talk::new("*Box *Lamp Table");
+    talk.check("take the box", "! TAKE Box @0: the Box is too far away");
+    talk.settings = (plain().0, rich().1);
+    talk.check("take the box", "GO Box; TAKE Box");
+    talk.check("turn off the lamp", "! SWITCH Lamp @0: the Lamp is already off");
+    talk.check("take the lamp", "! TAKE Lamp @0: the Lamp is too heavy");
+}
+
+#[test]
 fn the_evidence_says_what_was_near_and_what_was_dropped() {
     let talk = Talk::new("Box Lamp Table");
     let unsure = talk.answer("juggle the box");
