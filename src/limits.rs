@@ -52,10 +52,16 @@ pub const STORE_VALUE_BYTES_MAX: usize = 8 * 1024;
 pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
 /// Events of one batch: one command's worth.
 pub const BATCH_EVENTS_MAX: usize = 16;
+/// Bytes of one batch's bodies before sealing.
+pub const BATCH_BYTES_MAX: usize = 8 * 1024 * 1024;
 /// Batches waiting for the committer; then an append is refused as busy.
 pub const COMMIT_QUEUE_MAX: usize = 4_096;
+/// Bytes of the batches waiting for the committer; then an append is refused as busy.
+pub const COMMIT_QUEUE_BYTES_MAX: usize = 64 * 1024 * 1024;
 /// Batches flushed together.
 pub const COMMIT_GROUP_MAX: usize = 512;
+/// Bytes of the batches flushed together; a group ends with the batch that reaches it.
+pub const COMMIT_GROUP_BYTES_MAX: usize = 8 * 1024 * 1024;
 
 /// Messages waiting in one user's mailbox; then an honest `Busy`.
 pub const MAILBOX_MAX: usize = 32;
@@ -75,5 +81,7 @@ const _: () = {
     assert!(UTTERANCE_BYTES_MAX < FRAME_BYTES_MAX);
     assert!(SCENE_FILE_BYTES_MAX < FRAME_BYTES_MAX);
     assert!(COMMIT_GROUP_MAX <= COMMIT_QUEUE_MAX);
+    assert!(RECORD_BYTES_MAX <= BATCH_BYTES_MAX);
+    assert!(BATCH_BYTES_MAX <= COMMIT_QUEUE_BYTES_MAX);
     assert!(PROGRAM_STEPS_MAX <= EPISODE_ACTIONS_MAX);
 };
