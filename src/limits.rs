@@ -21,6 +21,8 @@ pub const PROGRAM_STEPS_MAX: usize = 128;
 pub const CANDIDATES_MAX: usize = 32;
 /// Combinations tried in the cross product of clauses.
 pub const COMBINATIONS_MAX: usize = 256;
+/// Choices of types tried for the names of one clause: the best, then the others that share a name.
+pub const TYPE_CHOICES_MAX: usize = 12;
 /// Exemplars shown as evidence.
 pub const EVIDENCE_NEAREST_MAX: usize = 3;
 /// Discarded candidates shown as evidence.
