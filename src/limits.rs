@@ -68,6 +68,10 @@ pub const COMMIT_GROUP_BYTES_MAX: usize = 8 * 1024 * 1024;
 
 /// Messages waiting in one user's mailbox; then an honest `Busy`.
 pub const MAILBOX_MAX: usize = 32;
+/// Requests waiting for one training to end; then an honest `Busy`.
+pub const WAITERS_MAX: usize = 8;
+/// Seconds that one request may wait for a training to end; well below [`CLIENT_RETRY_S_MAX`].
+pub const WAIT_S_MAX: u32 = 30;
 /// Users awake at once; the longest idle one goes to sleep.
 pub const AWAKE_USERS_MAX: usize = 10_000;
 /// Minds kept in memory, over all tenants; a mind has some hundred kilobytes.
@@ -80,6 +84,10 @@ pub const FRAME_BYTES_MAX: usize = 512 * 1024;
 pub const FRAMES_MAX: usize = 4;
 /// Requests the gateway has handed to actors and not yet answered.
 pub const GATEWAY_IN_FLIGHT_MAX: usize = 8_192;
+/// Requests waiting for the directory. It takes whatever the gateway may have in flight.
+pub const DIRECTORY_QUEUE_MAX: usize = GATEWAY_IN_FLIGHT_MAX;
+/// Nested maps and lists of one wire message; a request needs 4.
+pub const WIRE_DEPTH_MAX: usize = 32;
 
 const _: () = {
     assert!(CLIENT_IN_FLIGHT_MAX < REQUEST_RING);
@@ -88,5 +96,7 @@ const _: () = {
     assert!(COMMIT_GROUP_MAX <= COMMIT_QUEUE_MAX);
     assert!(RECORD_BYTES_MAX <= BATCH_BYTES_MAX);
     assert!(BATCH_BYTES_MAX <= COMMIT_QUEUE_BYTES_MAX);
+    assert!((WAIT_S_MAX as u64) < CLIENT_RETRY_S_MAX);
+    assert!(WAITERS_MAX < MAILBOX_MAX);
     assert!(PROGRAM_STEPS_MAX <= EPISODE_ACTIONS_MAX);
 };
