@@ -47,10 +47,10 @@ pub fn talk(
     converse(client, &mut lines, screen, stages)
 }
 
-fn converse(
-    client: &Client,
-    lines: &mut dyn Lines,
-    screen: Screen<'_>,
+fn converse<'a>(
+    client: &'a Client,
+    lines: &'a mut dyn Lines,
+    screen: Screen<'a>,
     stages: Stages,
 ) -> Result<(), Failure> {
     let user = client.user().as_str();

@@ -5,6 +5,7 @@ use super::play::{PlayError, Player};
 use crate::cli::failure::Failure;
 use crate::cli::recipe;
 use crate::frontends::Client;
+use crate::ids::UserId;
 
 /// Bytes of a transcript file. A story of five hundred utterances has under 100 kB.
 const FILE_BYTES_MAX: u64 = 4 * 1024 * 1024;
@@ -43,9 +44,10 @@ impl TranscriptFile {
         Ok(TranscriptFile { path: path.to_owned(), transcript })
     }
 
-    /// The person that the file names, if it names one.
-    pub fn user(&self) -> Option<&str> {
-        self.transcript.user()
+    /// The name of the file's person, who is nobody of another file: `number` tells them apart.
+    pub fn person(&self, number: usize) -> Result<UserId, Failure> {
+        let name = self.transcript.user().unwrap_or("person");
+        UserId::new(&format!("{name} {number}")).map_err(Failure::bad_input)
     }
 
     /// The text of the recipe that the file is for; `default` when it names none.

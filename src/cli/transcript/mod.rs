@@ -15,7 +15,6 @@ use clap::{Args, Subcommand};
 
 use super::embedded;
 use super::failure::Failure;
-use crate::ids::UserId;
 use crate::service::{Data, Service};
 pub use file::{PlayedFile, TranscriptFile};
 
@@ -80,7 +79,7 @@ fn check(files: &[PathBuf]) -> Result<(), Failure> {
 #[derive(Default)]
 struct Services {
     by_recipe: BTreeMap<String, Service>,
-    people: u64,
+    people: usize,
 }
 
 impl Services {
@@ -92,8 +91,7 @@ impl Services {
         }
         let service = &self.by_recipe[&recipe];
         self.people += 1;
-        let user = UserId::new(&format!("person {}", self.people)).map_err(Failure::failed)?;
-        let client = service.connect(user).map_err(Failure::failed)?;
+        let client = service.connect(file.person(self.people)?).map_err(Failure::failed)?;
         file.play(&client)
     }
 }

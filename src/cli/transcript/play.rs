@@ -7,7 +7,7 @@ use crate::frontends::{Client, ClientError};
 use crate::ids::Seq;
 use crate::language::{Evidence, Outcome};
 use crate::limits::SCENE_FILE_BYTES_MAX;
-use crate::session::{OnClash, RejectionCode, Reply, Told};
+use crate::session::{RejectionCode, Reply, Told};
 use crate::world::Stage;
 
 /// How long one training may take.
