@@ -59,7 +59,8 @@ fn pack<T: Serialize>(body: &T) -> Vec<u8> {
 
 fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Result<T, DecodeError> {
     let wrong = |reason: String| DecodeError::Body { kind, reason };
-    let mut decoder = rmp_serde::Deserializer::from_read_ref(body);
+    // `from_read_ref` would keep showing the whole body, read or not.
+    let mut decoder = rmp_serde::Deserializer::new(body);
     // A scene file of nested tables must not overflow the stack of whoever reads it.
     decoder.set_max_depth(64);
     let event = T::deserialize(&mut decoder).map_err(|error| wrong(error.to_string()))?;

@@ -40,6 +40,13 @@ impl Pending {
         (sender, Pending(receiver))
     }
 
+    /// A promise that is kept already.
+    pub(super) fn kept(result: Result<Durable, AppendError>) -> Pending {
+        let (sender, pending) = Pending::promise();
+        sender.send(result).expect("the other end is held right here");
+        pending
+    }
+
     /// Blocks until the promise is kept; for tools and tests, never inside an actor.
     pub fn wait(self) -> Result<Durable, AppendError> {
         self.0.blocking_recv().unwrap_or(Err(AppendError::Gone))
@@ -71,6 +78,9 @@ pub enum AppendError {
     TooLarge { reason: String },
     #[error("the person behind this stream was erased")]
     Erased,
+    /// Nothing was appended: the body cannot be sealed.
+    #[error("nothing can be sealed for this stream: {reason}")]
+    Key { reason: String },
     /// The committer is gone; the batch may or may not be there.
     #[error("the log was closed before it answered")]
     Gone,

@@ -23,7 +23,7 @@ pub use settings::{ExemplarSettings, ThresholdReading};
 
 use super::{Parse, Scored, SemanticParser, WordTable};
 use crate::ids::Digest;
-use crate::language::{Exemplar, LiftedUtterance, Near};
+use crate::language::{Clause, Exemplar, LiftedUtterance, Near};
 use crate::limits::CANDIDATES_MAX;
 use crate::numerics::Floats;
 
@@ -153,7 +153,8 @@ impl ExemplarParser {
 }
 
 impl SemanticParser for ExemplarParser {
-    fn parse(&self, lifted: &LiftedUtterance) -> Parse {
+    fn parse(&self, clause: &Clause) -> Parse {
+        let lifted = &clause.lifted;
         let threshold = self.threshold();
         let exact = self.exact.get(lifted).map_or(&[][..], Vec::as_slice);
         let found = self.index.near(&self.embed(lifted), threshold, self.nearest);
@@ -161,12 +162,14 @@ impl SemanticParser for ExemplarParser {
         // An exact form comes first even where dropped stop words make others equally near.
         let ordered = exact.iter().map(|&number| (number, 0.0)).chain(within);
         let mut candidates: Vec<Scored> = Vec::new();
-        for (number, distance) in ordered {
+        let mut exact_programs = 0;
+        for (place, (number, distance)) in ordered.enumerate() {
             let program = &self.exemplars[number as usize].program;
             if candidates.len() < CANDIDATES_MAX
                 && candidates.iter().all(|known| known.program != *program)
             {
                 candidates.push(Scored { program: program.clone(), distance, number });
+                exact_programs += usize::from(place < exact.len());
             }
         }
         let mut nearest: Vec<(u32, f32)> = exact.iter().map(|&number| (number, 0.0)).collect();
@@ -176,7 +179,7 @@ impl SemanticParser for ExemplarParser {
             candidates,
             nearest: nearest.into_iter().map(|near| self.near(near)).collect(),
             threshold,
-            exact: !exact.is_empty(),
+            exact: exact_programs,
         }
     }
 }

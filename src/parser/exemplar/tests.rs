@@ -74,7 +74,7 @@ fn trained(text: &str) -> (ExemplarParser, Figures) {
 }
 
 fn answer(parser: &ExemplarParser, text: &str) -> Option<String> {
-    let parse = parser.parse(&LiftedUtterance::parse(text));
+    let parse = parser.parse(&Clause::of(&LiftedUtterance::parse(text)));
     parse.candidates.first().map(|candidate| candidate.program.to_string())
 }
 

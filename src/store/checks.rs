@@ -1,0 +1,41 @@
+//! What every backend checks in the same way.
+
+use super::{AppendError, DataKey, KeyError, Keys, ReadError};
+use crate::events::Head;
+use crate::ids::StreamId;
+
+/// The expected-head check. (Invariant `SingleWriter`.)
+pub(super) fn head(stream: &StreamId, after: Head, found: Head) -> Result<(), AppendError> {
+    if after == found {
+        return Ok(());
+    }
+    let stream = stream.clone();
+    Err(AppendError::Conflict { stream, expected: after.seq, found: found.seq })
+}
+
+/// The key to seal with; a new stream gets a new one.
+pub(super) fn key_to_append(
+    keys: &Keys,
+    stream: &StreamId,
+    head: Head,
+) -> Result<DataKey, AppendError> {
+    let key = match keys.user_key(stream) {
+        Err(KeyError::Missing { .. }) if head == Head::EMPTY => {
+            keys.make_user_keys(std::slice::from_ref(stream)).and_then(|()| keys.user_key(stream))
+        }
+        found => found,
+    };
+    key.map_err(|error| match error {
+        KeyError::Erased { .. } => AppendError::Erased,
+        // Not fatal for the log: the other people's keys may be in order.
+        other => AppendError::Key { reason: other.to_string() },
+    })
+}
+
+/// The key to read with.
+pub(super) fn key_to_read(keys: &Keys, stream: &StreamId) -> Result<DataKey, ReadError> {
+    keys.user_key(stream).map_err(|error| match error {
+        KeyError::Erased { .. } => ReadError::Erased,
+        other => ReadError::Store { reason: other.to_string() },
+    })
+}

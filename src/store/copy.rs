@@ -1,0 +1,84 @@
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::files::make_dir;
+use super::open::{lock_existing, open_log};
+use super::{Entropy, Keys, OpenError, OsEntropy, Store};
+
+/// A copy of a data directory's log, for tools that only look: they never open the directory
+/// itself, which opening would write to. Removed when dropped.
+///
+/// Secrets are not copied: keys are read where they are.
+#[derive(Debug)]
+pub struct PrivateCopy {
+    dir: PathBuf,
+    keys: PathBuf,
+}
+
+/// Copies the log of the closed data directory `dir` to a new directory of the system's temporary
+/// space.
+///
+/// - errors: it is in use, is no data directory, or cannot be read or copied.
+pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
+    // Held until the copy is complete: a log that is being written would be copied torn.
+    let _lock = lock_existing(dir)?;
+    let mut name = [0; 8];
+    OsEntropy.fill(&mut name);
+    let name = format!("apprentice-{:016x}", u64::from_be_bytes(name));
+    let target = std::env::temp_dir().join(name);
+    let copy = PrivateCopy { dir: target, keys: dir.join("keys") };
+    let copied = make_dir(&copy.dir)
+        .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
+        .and_then(|()| match fs::copy(dir.join("HEADS"), copy.dir.join("HEADS")) {
+            // That is for the opening to report.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            copied => copied.map(|_| ()),
+        });
+    copied.map_err(|error| OpenError::Io {
+        dir: dir.display().to_string(),
+        path: copy.dir.display().to_string(),
+        reason: format!("it cannot be copied: {error}"),
+    })?;
+    Ok(copy)
+}
+
+impl PrivateCopy {
+    /// The store of the copy, with empty caches in memory; new people cannot be added to it.
+    ///
+    /// Errors name the copy's own directory as the place where the damage was seen.
+    pub fn open(&self) -> Result<Store, OpenError> {
+        let lock = self.dir.join("LOCK");
+        let lock = fs::File::create(&lock).map_err(|error| OpenError::Io {
+            dir: self.dir.display().to_string(),
+            path: lock.display().to_string(),
+            reason: error.to_string(),
+        })?;
+        let lock = super::open::lock(&self.dir, lock)?;
+        let keys = Arc::new(Keys::open_read_only(&self.keys, Arc::new(OsEntropy)));
+        let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock))?;
+        Ok(Store::around(Arc::new(log), keys))
+    }
+}
+
+impl Drop for PrivateCopy {
+    fn drop(&mut self) {
+        if let Err(error) = fs::remove_dir_all(&self.dir) {
+            tracing::warn!(dir = %self.dir.display(), %error, "a private copy stays behind");
+        }
+    }
+}
+
+fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
+    make_dir(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (source, target) = (entry.path(), to.join(entry.file_name()));
+        match entry.file_type()?.is_dir() {
+            true => copy_tree(&source, &target)?,
+            false => fs::copy(&source, &target).map(|_| ())?,
+        }
+    }
+    Ok(())
+}

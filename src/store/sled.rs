@@ -1,0 +1,347 @@
+//! The log on `sled`: one tree per tenant, one committer, group commit.
+
+mod cache;
+mod commit;
+mod read;
+
+pub(super) use self::cache::SledCache;
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, OnceLock, RwLock};
+use std::thread::JoinHandle;
+
+use self::commit::{Committer, Job, Syncer};
+use self::read::{Records, frame_at, last_seqs};
+use super::heads::{Heads, HeadsFile};
+use super::log::{Pending, ReadError};
+use super::quiet::guarded;
+use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
+use crate::events::{Batch, Head, Header, Record};
+use crate::ids::{Seq, StreamId, StreamKey, TenantId};
+use crate::limits::{COMMIT_QUEUE_BYTES_MAX, COMMIT_QUEUE_MAX};
+
+/// Bytes of pages that `sled` keeps; it uses up to three times as much.
+const CACHE_BYTES: u64 = 64 * 1024 * 1024;
+/// Streams with records have their records in the tree `events/<tenant>`.
+const TREE_PREFIX: &str = "events/";
+
+/// The embedded log.
+///
+/// *Durable* means: batch applied, `flush`, `fdatasync` of sled's file (its flush alone does not
+/// reach the disk), the new heads written to a file of our own, `fdatasync` of that. Only then are
+/// promises kept and do readers see the records. After the first I/O error the log is poisoned: it
+/// acknowledges nothing until it is opened anew.
+pub struct SledLog {
+    shared: Arc<Shared>,
+    sender: Option<SyncSender<Job>>,
+    committer: Option<JoinHandle<()>>,
+    /// Held until the database is closed: fields are dropped in this order.
+    _lock: Option<Arc<File>>,
+}
+
+/// What the committer and the readers share.
+struct Shared {
+    db: ::sled::Db,
+    keys: Arc<Keys>,
+    /// What is durable. Readers see nothing beyond it.
+    heads: RwLock<Heads>,
+    poisoned: OnceLock<String>,
+    waiting_bytes: AtomicUsize,
+}
+
+/// Something that was there and is not any more, found when a log is opened.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Damage {
+    #[error(
+        "stream {stream}: {acknowledged} records were acknowledged, only {found} are there; \
+         the last {} are lost", acknowledged - found
+    )]
+    LostTail { stream: StreamId, acknowledged: u64, found: u64 },
+    #[error("stream {stream}: {error}")]
+    Record { stream: StreamId, error: ReadError },
+    #[error("the heads file, which guards against lost records, is damaged: {reason}")]
+    Heads { reason: String },
+}
+
+/// Why a log cannot be opened; `super::open` adds the directory and what to do.
+#[derive(Debug)]
+pub(super) enum LogError {
+    Io(io::Error),
+    Database(String),
+    Damaged(Vec<Damage>),
+}
+
+impl SledLog {
+    /// Opens the database `<dir>/log` and the heads file `<dir>/HEADS`, making both if `fresh`.
+    pub(super) fn open(
+        dir: &Path,
+        keys: Arc<Keys>,
+        fresh: bool,
+        lock: Arc<File>,
+    ) -> Result<SledLog, LogError> {
+        let mut log = SledLog::open_with(dir, keys, fresh, |path| {
+            let file = OpenOptions::new().read(true).write(true).open(path)?;
+            Ok(Box::new(move || file.sync_data()))
+        })?;
+        log._lock = Some(lock);
+        Ok(log)
+    }
+
+    /// The tenants that have records.
+    pub fn tenants(&self) -> Vec<TenantId> {
+        let heads = self.shared.heads.read().expect("no holder of the heads panics");
+        heads.keys().cloned().collect()
+    }
+
+    /// `syncer` makes, from the path of sled's file, what syncs it; tests make one that fails.
+    fn open_with(
+        dir: &Path,
+        keys: Arc<Keys>,
+        fresh: bool,
+        syncer: impl FnOnce(&Path) -> io::Result<Syncer>,
+    ) -> Result<SledLog, LogError> {
+        let database = dir.join("log");
+        if !fresh && !database.join("db").is_file() {
+            let missing = format!("{} is missing", database.join("db").display());
+            return Err(LogError::Database(missing));
+        }
+        let db = open_database(&database, CACHE_BYTES).map_err(LogError::Database)?;
+        let heads_path = dir.join("HEADS");
+        let recorded = HeadsFile::read(&heads_path).map_err(LogError::Io)?;
+        let recorded = match (recorded, fresh) {
+            (Some(read), _) => match read.damage {
+                None => read.heads,
+                Some(reason) => return Err(LogError::Damaged(vec![Damage::Heads { reason }])),
+            },
+            (None, true) => Heads::new(),
+            (None, false) => {
+                let reason = format!("{} is missing", heads_path.display());
+                return Err(LogError::Damaged(vec![Damage::Heads { reason }]));
+            }
+        };
+        let heads = guarded(|| compare(&db, &recorded)).map_err(LogError::Database)??;
+        // What sled holds beyond the recorded heads was never acknowledged. It is kept, and made
+        // as durable as the rest before anybody reads it.
+        guarded(|| db.flush()).map_err(LogError::Database)?.map_err(database_error)?;
+        let mut sync = syncer(&database.join("db")).map_err(LogError::Io)?;
+        sync().map_err(LogError::Io)?;
+        super::files::sync_dir(&database).map_err(LogError::Io)?;
+        let heads_file = HeadsFile::replace(&heads_path, &heads).map_err(LogError::Io)?;
+
+        let shared = Arc::new(Shared {
+            db,
+            keys,
+            heads: RwLock::new(heads),
+            poisoned: OnceLock::new(),
+            waiting_bytes: AtomicUsize::new(0),
+        });
+        let (sender, receiver) = sync_channel(COMMIT_QUEUE_MAX);
+        let committer = Committer::new(shared.clone(), heads_file, sync);
+        let committer = std::thread::Builder::new()
+            .name("committer".to_owned())
+            .spawn(move || committer.run(&receiver))
+            .map_err(LogError::Io)?;
+        Ok(SledLog { shared, sender: Some(sender), committer: Some(committer), _lock: None })
+    }
+
+    /// The sentence that poisoned the log, if one did.
+    pub fn poisoned(&self) -> Option<&str> {
+        self.shared.poisoned.get().map(String::as_str)
+    }
+}
+
+impl Drop for SledLog {
+    fn drop(&mut self) {
+        // The committer answers what is waiting, then ends with its channel.
+        self.sender = None;
+        if let Some(committer) = self.committer.take() {
+            // A committer that panicked has poisoned the log and told everybody who waited.
+            let _ = committer.join();
+        }
+    }
+}
+
+impl EventLog for SledLog {
+    fn append(&self, stream: &StreamId, after: Head, batch: Batch) -> Pending {
+        if let Some(reason) = self.shared.poisoned.get() {
+            return Pending::kept(Err(AppendError::Poisoned { reason: reason.clone() }));
+        }
+        let draft = match Draft::encode(batch) {
+            Ok(draft) => draft,
+            Err(error) => return Pending::kept(Err(error)),
+        };
+        let bytes = draft.bytes();
+        let waiting = self.shared.waiting_bytes.fetch_add(bytes, Ordering::Relaxed);
+        let (promise, pending) = Pending::promise();
+        let job = Job { stream: stream.clone(), after, draft, promise };
+        let sender = self.sender.as_ref().expect("only dropping the log takes it");
+        let refused = match waiting + bytes > COMMIT_QUEUE_BYTES_MAX {
+            true => Some((job, AppendError::Busy { waiting: COMMIT_QUEUE_MAX })),
+            false => match sender.try_send(job) {
+                Ok(()) => None,
+                Err(TrySendError::Full(job)) => {
+                    Some((job, AppendError::Busy { waiting: COMMIT_QUEUE_MAX }))
+                }
+                Err(TrySendError::Disconnected(job)) => Some((job, AppendError::Gone)),
+            },
+        };
+        if let Some((job, error)) = refused {
+            self.shared.waiting_bytes.fetch_sub(bytes, Ordering::Relaxed);
+            job.answer(Err(error));
+        }
+        pending
+    }
+
+    fn read<'a>(
+        &'a self,
+        stream: &StreamId,
+        from: Seq,
+    ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError> {
+        let head = self.shared.head(stream);
+        if from.get() > head.seq {
+            return Ok(Box::new(std::iter::empty()));
+        }
+        let key = checks::key_to_read(&self.shared.keys, stream)?;
+        let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
+        let last = match super::sealing::before(from) {
+            None => Head::EMPTY,
+            Some(before) => head_at(&tree, stream.key, before)?,
+        };
+        let walk = Walk::after(stream.key, last);
+        Ok(Box::new(Records::new(&tree, key, walk, head)))
+    }
+
+    fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        Ok(self.shared.head(stream))
+    }
+
+    fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
+        let heads = self.shared.heads.read().expect("no holder of the heads panics");
+        let keys = heads.get(tenant).into_iter().flat_map(|streams| streams.keys());
+        Ok(keys.map(|&key| StreamId { tenant: tenant.clone(), key }).collect())
+    }
+}
+
+impl Shared {
+    fn head(&self, stream: &StreamId) -> Head {
+        let heads = self.heads.read().expect("no holder of the heads panics");
+        let found = heads.get(&stream.tenant).and_then(|streams| streams.get(&stream.key));
+        found.copied().unwrap_or(Head::EMPTY)
+    }
+
+    fn tree(&self, tenant: &TenantId) -> Result<::sled::Tree, ReadError> {
+        let name = format!("{TREE_PREFIX}{tenant}");
+        self.db.open_tree(name).map_err(|error| store_error(error.to_string()))
+    }
+}
+
+/// Opens a `sled` database whose writes reach the disk only when we say so.
+pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db, String> {
+    let config = ::sled::Config::new()
+        .path(path)
+        .cache_capacity(cache_bytes)
+        // Background flushing would give "durable" a second meaning.
+        .flush_every_ms(None);
+    guarded(|| config.open())?.map_err(|error| error.to_string())
+}
+
+/// Compares what the database holds with what was acknowledged.
+///
+/// - returns: where each stream ends now.
+/// - errors: [`LogError::Damaged`] with all that is missing or unreadable at a stream's end.
+fn compare(db: &::sled::Db, recorded: &Heads) -> Result<Heads, LogError> {
+    let mut heads = Heads::new();
+    let mut damage = Vec::new();
+    for name in db.tree_names() {
+        let tenant =
+            std::str::from_utf8(&name).ok().and_then(|name| name.strip_prefix(TREE_PREFIX));
+        let Some(tenant) = tenant.and_then(|name| TenantId::new(name).ok()) else { continue };
+        let tree = db.open_tree(&name).map_err(database_error)?;
+        let known = recorded.get(&tenant);
+        for (key, seq) in last_seqs(&tree).map_err(LogError::Database)? {
+            let acknowledged = known.and_then(|heads| heads.get(&key)).copied();
+            let stream = StreamId { tenant: tenant.clone(), key };
+            match end_of(&tree, &stream, acknowledged.unwrap_or(Head::EMPTY), seq) {
+                Ok(head) => {
+                    heads.entry(tenant.clone()).or_default().insert(key, head);
+                }
+                Err(found) => damage.push(found),
+            }
+        }
+    }
+    for (tenant, streams) in recorded {
+        for (&key, head) in streams {
+            let stream = StreamId { tenant: tenant.clone(), key };
+            let seen = heads.get(tenant).is_some_and(|streams| streams.contains_key(&key));
+            let reported = damage.iter().any(|damage| damage.stream() == Some(&stream));
+            if !seen && !reported {
+                damage.push(Damage::LostTail { stream, acknowledged: head.seq, found: 0 });
+            }
+        }
+    }
+    match damage.is_empty() {
+        true => Ok(heads),
+        false => Err(LogError::Damaged(damage)),
+    }
+}
+
+/// Where a stream ends whose last record in the tree has the number `last`.
+fn end_of(
+    tree: &::sled::Tree,
+    stream: &StreamId,
+    acknowledged: Head,
+    last: u64,
+) -> Result<Head, Damage> {
+    let damaged = |error| Damage::Record { stream: stream.clone(), error };
+    if last < acknowledged.seq {
+        let (stream, acknowledged) = (stream.clone(), acknowledged.seq);
+        return Err(Damage::LostTail { stream, acknowledged, found: last });
+    }
+    if let Some(seq) = Seq::new(acknowledged.seq) {
+        let found = head_at(tree, stream.key, seq).map_err(damaged)?;
+        if found != acknowledged {
+            let (expected, found) = (acknowledged.digest.to_hex(), found.digest.to_hex());
+            let reason = format!("the heads file says its digest is {expected}, it is {found}");
+            return Err(damaged(ReadError::Seal { seq: acknowledged.seq, reason }));
+        }
+    }
+    let mut walk = Walk::after(stream.key, acknowledged);
+    while walk.last().seq < last {
+        let frame = frame_at(tree, stream.key, walk.last().next()).map_err(damaged)?;
+        walk.step(&frame).map_err(damaged)?;
+    }
+    Ok(walk.last())
+}
+
+/// The head a stream had when `seq` was its last record.
+fn head_at(tree: &::sled::Tree, stream: StreamKey, seq: Seq) -> Result<Head, ReadError> {
+    let frame = frame_at(tree, stream, seq)?;
+    let (header, _, digest) =
+        Header::unframe(&frame).map_err(|error| ReadError::Header { seq: seq.get(), error })?;
+    match header.seq == seq {
+        true => Ok(Head { seq: seq.get(), digest }),
+        false => Err(ReadError::Gap { expected: seq.get(), found: header.seq.get() }),
+    }
+}
+
+impl Damage {
+    /// The stream it hurts, if it is one stream's.
+    pub fn stream(&self) -> Option<&StreamId> {
+        match self {
+            Damage::LostTail { stream, .. } | Damage::Record { stream, .. } => Some(stream),
+            Damage::Heads { .. } => None,
+        }
+    }
+}
+
+fn store_error(reason: String) -> ReadError {
+    ReadError::Store { reason }
+}
+
+fn database_error(error: ::sled::Error) -> LogError {
+    LogError::Database(error.to_string())
+}

@@ -1,0 +1,58 @@
+use std::fs::{self, File};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::super::cache::{Cache, Cached};
+use super::super::quiet::guarded;
+use super::open_database;
+
+/// Bytes of pages kept in memory.
+const CACHE_BYTES: u64 = 16 * 1024 * 1024;
+
+/// The caches on disk: a database of their own, so that a damaged cache is thrown away whole and
+/// the log's database holds nothing but the log. Never synced by us.
+pub(in super::super) struct SledCache {
+    db: ::sled::Db,
+    /// Held until the database is closed.
+    _lock: Arc<File>,
+}
+
+impl SledCache {
+    /// Opens the cache in `dir`; one that does not open is replaced by an empty one.
+    pub(in super::super) fn open(dir: &Path, lock: Arc<File>) -> Result<SledCache, String> {
+        let db = open_database(dir, CACHE_BYTES).or_else(|reason| {
+            tracing::warn!(%reason, "the cache of minds and snapshots is damaged and starts afresh");
+            if dir.exists() {
+                fs::remove_dir_all(dir).map_err(|error| error.to_string())?;
+            }
+            open_database(dir, CACHE_BYTES)
+        })?;
+        Ok(SledCache { db, _lock: lock })
+    }
+}
+
+impl Cache for SledCache {
+    fn replace(&self, shelf: &str, prefix: &[u8], entries: Vec<(Vec<u8>, Vec<u8>)>) -> Cached<()> {
+        let replaced = guarded(|| {
+            let tree = self.db.open_tree(shelf)?;
+            let mut batch = ::sled::Batch::default();
+            for key in tree.scan_prefix(prefix).keys() {
+                batch.remove(key?);
+            }
+            for (key, value) in entries {
+                batch.insert(key, value);
+            }
+            tree.apply_batch(batch)
+        })?;
+        replaced.map_err(|error: ::sled::Error| error.to_string())
+    }
+
+    fn scan(&self, shelf: &str, prefix: &[u8]) -> Cached<Vec<(Vec<u8>, Vec<u8>)>> {
+        let found: Result<Vec<_>, ::sled::Error> = guarded(|| {
+            let tree = self.db.open_tree(shelf)?;
+            let entries = tree.scan_prefix(prefix);
+            entries.map(|entry| entry.map(|(key, value)| (key.to_vec(), value.to_vec()))).collect()
+        })?;
+        found.map_err(|error| error.to_string())
+    }
+}

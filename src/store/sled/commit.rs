@@ -1,0 +1,170 @@
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::Receiver;
+
+use tokio::sync::oneshot;
+
+use super::Shared;
+use super::read::{chunk_key, chunks};
+use crate::events::{Durable, Head};
+use crate::ids::{StreamId, TenantId};
+use crate::limits::{COMMIT_GROUP_BYTES_MAX, COMMIT_GROUP_MAX};
+use crate::store::heads::HeadsFile;
+use crate::store::quiet::guarded;
+use crate::store::{AppendError, Draft, checks};
+
+type Answer = Result<Durable, AppendError>;
+
+/// Makes sled's file reach the disk.
+pub(super) type Syncer = Box<dyn FnMut() -> io::Result<()> + Send>;
+
+/// One batch that waits for the committer.
+pub(super) struct Job {
+    pub stream: StreamId,
+    pub after: Head,
+    pub draft: Draft,
+    pub promise: oneshot::Sender<Answer>,
+}
+
+impl Job {
+    pub(super) fn answer(self, answer: Answer) {
+        // Whoever asked may have gone; the log does not mind.
+        let _ = self.promise.send(answer);
+    }
+}
+
+/// The only writer: it owns the expected-head check, the heads file and the meaning of *durable*.
+pub(super) struct Committer {
+    shared: Arc<Shared>,
+    heads_file: HeadsFile,
+    sync: Syncer,
+}
+
+/// What one group will have done once it is durable.
+#[derive(Default)]
+struct Group {
+    writes: BTreeMap<TenantId, ::sled::Batch>,
+    heads: BTreeMap<StreamId, Head>,
+    kept: Vec<(oneshot::Sender<Answer>, Durable)>,
+}
+
+impl Committer {
+    pub(super) fn new(shared: Arc<Shared>, heads_file: HeadsFile, sync: Syncer) -> Committer {
+        Committer { shared, heads_file, sync }
+    }
+
+    /// Commits until the log is dropped.
+    pub(super) fn run(mut self, jobs: &Receiver<Job>) {
+        while let Ok(first) = jobs.recv() {
+            let mut group = vec![first];
+            let mut bytes = group[0].draft.bytes();
+            while group.len() < COMMIT_GROUP_MAX && bytes < COMMIT_GROUP_BYTES_MAX {
+                let Ok(job) = jobs.try_recv() else { break };
+                bytes += job.draft.bytes();
+                group.push(job);
+            }
+            self.shared.waiting_bytes.fetch_sub(bytes, Ordering::Relaxed);
+            self.commit(group);
+        }
+    }
+
+    fn commit(&mut self, jobs: Vec<Job>) {
+        if let Some(reason) = self.shared.poisoned.get() {
+            let poisoned = AppendError::Poisoned { reason: reason.clone() };
+            jobs.into_iter().for_each(|job| job.answer(Err(poisoned.clone())));
+            return;
+        }
+        let Group { writes, heads, kept } = self.gather(jobs);
+        match self.make_durable(writes, &heads) {
+            Ok(()) => {
+                self.publish(heads);
+                for (promise, durable) in kept {
+                    let _ = promise.send(Ok(durable));
+                }
+            }
+            Err(reason) => {
+                tracing::error!(%reason, "the log is poisoned: nothing is acknowledged any more");
+                let poisoned = AppendError::Poisoned { reason: reason.clone() };
+                let _ = self.shared.poisoned.set(reason);
+                for (promise, _) in kept {
+                    let _ = promise.send(Err(poisoned.clone()));
+                }
+            }
+        }
+    }
+
+    /// Checks heads, seals and collects; answers at once what cannot be appended.
+    fn gather(&self, jobs: Vec<Job>) -> Group {
+        let new: Vec<StreamId> = jobs
+            .iter()
+            .filter(|job| job.after == Head::EMPTY)
+            .map(|job| job.stream.clone())
+            .collect();
+        // Many new people share the syncs of their key files. What goes wrong here goes wrong
+        // again below, and is answered there to the one whom it concerns.
+        let _ = self.shared.keys.make_user_keys(&new);
+        let mut group = Group::default();
+        for job in jobs {
+            let Job { stream, after, draft, promise } = job;
+            let found =
+                group.heads.get(&stream).copied().unwrap_or_else(|| self.shared.head(&stream));
+            let key = checks::head(&stream, after, found)
+                .and_then(|()| checks::key_to_append(&self.shared.keys, &stream, found));
+            let key = match key {
+                Ok(key) => key,
+                Err(error) => {
+                    let _ = promise.send(Err(error));
+                    continue;
+                }
+            };
+            let sealed = draft.seal(&key, self.shared.keys.entropy(), stream.key, after);
+            if !sealed.frames.is_empty() {
+                let writes = group.writes.entry(stream.tenant.clone()).or_default();
+                for (record, frame) in sealed.records.iter().zip(&sealed.frames) {
+                    for (chunk, value) in chunks(frame) {
+                        writes.insert(&chunk_key(stream.key, record.seq.get(), chunk), value);
+                    }
+                }
+                group.heads.insert(stream, sealed.head);
+            }
+            group.kept.push((promise, Durable::mint(sealed.records, sealed.head)));
+        }
+        group
+    }
+
+    /// Batch, flush, sync, heads frame, sync: in this order, and the first error ends it.
+    fn make_durable(
+        &mut self,
+        writes: BTreeMap<TenantId, ::sled::Batch>,
+        heads: &BTreeMap<StreamId, Head>,
+    ) -> Result<(), String> {
+        if writes.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        guarded(|| {
+            for (tenant, batch) in writes {
+                let tree = shared.tree(&tenant).map_err(|error| error.to_string())?;
+                tree.apply_batch(batch).map_err(|error| error.to_string())?;
+            }
+            shared.db.flush().map_err(|error| error.to_string()).map(|_| ())
+        })??;
+        (self.sync)().map_err(|error| format!("fdatasync of the log: {error}"))?;
+        self.heads_file.append(heads).map_err(|error| format!("the heads file: {error}"))
+    }
+
+    fn publish(&mut self, changed: BTreeMap<StreamId, Head>) {
+        let mut heads = self.shared.heads.write().expect("no holder of the heads panics");
+        for (stream, head) in changed {
+            heads.entry(stream.tenant).or_default().insert(stream.key, head);
+        }
+        drop(heads);
+        // Rewriting is housekeeping: if it fails, so will the next append, which says so.
+        let heads = self.shared.heads.read().expect("no holder of the heads panics");
+        if let Err(error) = self.heads_file.compact_if_long(&heads) {
+            tracing::warn!(%error, "the heads file could not be rewritten");
+        }
+    }
+}

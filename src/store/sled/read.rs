@@ -1,0 +1,173 @@
+use super::super::log::ReadError;
+use super::super::quiet::guarded;
+use super::super::{DataKey, Walk};
+use crate::events::{Head, Record};
+use crate::ids::{Seq, StreamKey};
+use crate::limits::STORE_VALUE_BYTES_MAX;
+
+/// stream key (16) ‖ sequence number (8) ‖ chunk (2), big-endian.
+pub(super) const KEY_BYTES: usize = 16 + 8 + 2;
+
+pub(super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
+    let mut key = [0; KEY_BYTES];
+    key[..16].copy_from_slice(&stream.0);
+    key[16..24].copy_from_slice(&seq.to_be_bytes());
+    key[24..].copy_from_slice(&chunk.to_be_bytes());
+    key
+}
+
+fn parse_key(bytes: &[u8]) -> Option<(StreamKey, u64, u16)> {
+    let bytes: &[u8; KEY_BYTES] = bytes.try_into().ok()?;
+    let (stream, rest) = bytes.split_first_chunk()?;
+    let (seq, chunk) = rest.split_first_chunk()?;
+    let chunk = chunk.try_into().ok()?;
+    Some((StreamKey(*stream), u64::from_be_bytes(*seq), u16::from_be_bytes(chunk)))
+}
+
+/// The values a framed record is stored as.
+pub(super) fn chunks(frame: &[u8]) -> impl Iterator<Item = (u16, &[u8])> {
+    let numbered = (0..=u16::MAX).zip(frame.chunks(STORE_VALUE_BYTES_MAX));
+    debug_assert!(frame.len() <= STORE_VALUE_BYTES_MAX * usize::from(u16::MAX));
+    numbered
+}
+
+/// Joins chunks again, insisting on each.
+#[derive(Default)]
+struct Joiner {
+    frame: Vec<u8>,
+    next: u16,
+}
+
+impl Joiner {
+    fn push(&mut self, seq: u64, chunk: u16, value: &[u8]) -> Result<(), ReadError> {
+        if chunk != self.next {
+            let reason = format!("expected chunk {}, found {chunk}", self.next);
+            return Err(ReadError::Chunks { seq, reason });
+        }
+        self.frame.extend_from_slice(value);
+        self.next = self.next.saturating_add(1);
+        Ok(())
+    }
+}
+
+/// The framed bytes of one record.
+pub(super) fn frame_at(
+    tree: &::sled::Tree,
+    stream: StreamKey,
+    seq: Seq,
+) -> Result<Vec<u8>, ReadError> {
+    let seq = seq.get();
+    let mut joiner = Joiner::default();
+    let mut values = tree.range(chunk_key(stream, seq, 0)..=chunk_key(stream, seq, u16::MAX));
+    while let Some((key, value)) = next(&mut values)? {
+        let (_, _, chunk) = parse_key(&key).ok_or_else(|| foreign_key(&key))?;
+        joiner.push(seq, chunk, &value)?;
+    }
+    match joiner.next {
+        0 => Err(ReadError::Store { reason: format!("record {seq} is missing") }),
+        _ => Ok(joiner.frame),
+    }
+}
+
+/// The number of the last record of each stream in a tree, two look-ups a stream.
+pub(super) fn last_seqs(tree: &::sled::Tree) -> Result<Vec<(StreamKey, u64)>, String> {
+    let mut found = Vec::new();
+    let mut from = vec![0; KEY_BYTES];
+    while let Some(entry) = tree.range(from.clone()..).next() {
+        let (key, _) = entry.map_err(|error| error.to_string())?;
+        let (stream, _, _) = parse_key(&key).ok_or_else(|| foreign_key(&key).to_string())?;
+        let end = chunk_key(stream, u64::MAX, u16::MAX);
+        let last = tree.get_lt(end).map_err(|error| error.to_string())?;
+        let (key, _) = last.ok_or("a stream vanished while it was looked at")?;
+        match parse_key(&key) {
+            Some((last_stream, seq, _)) if last_stream == stream => found.push((stream, seq)),
+            _ => return Err(foreign_key(&key).to_string()),
+        }
+        from = end.to_vec();
+        from.push(0);
+    }
+    Ok(found)
+}
+
+/// The records of one stream, one in memory at a time. No lock is held between two of them, and
+/// records appended meanwhile are not shown.
+pub(super) struct Records {
+    values: ::sled::Iter,
+    /// A value that was read and belongs to the next record.
+    pending: Option<(::sled::IVec, ::sled::IVec)>,
+    key: DataKey,
+    walk: Walk,
+    end: Head,
+    ended: bool,
+}
+
+impl Records {
+    /// From the record after `walk`'s last one to `end`.
+    pub(super) fn new(tree: &::sled::Tree, key: DataKey, walk: Walk, end: Head) -> Records {
+        let stream = walk.stream();
+        let first = chunk_key(stream, walk.last().next().get(), 0);
+        let values = tree.range(first..=chunk_key(stream, end.seq, u16::MAX));
+        Records { values, pending: None, key, walk, end, ended: false }
+    }
+
+    fn read_one(&mut self) -> Result<Record, ReadError> {
+        let seq = self.walk.last().next().get();
+        let mut joiner = Joiner::default();
+        loop {
+            let entry = match self.pending.take() {
+                Some(entry) => Some(entry),
+                None => next(&mut self.values)?,
+            };
+            let Some((key, value)) = entry else { break };
+            let (_, found, chunk) = parse_key(&key).ok_or_else(|| foreign_key(&key))?;
+            if found != seq {
+                if joiner.next == 0 {
+                    return Err(ReadError::Gap { expected: seq, found });
+                }
+                self.pending = Some((key, value));
+                break;
+            }
+            joiner.push(seq, chunk, &value)?;
+        }
+        if joiner.next == 0 {
+            let reason = format!("record {seq} of {} is missing", self.end.seq);
+            return Err(ReadError::Store { reason });
+        }
+        let record = self.walk.open(&self.key, &joiner.frame)?;
+        if seq == self.end.seq && record.digest != self.end.digest {
+            let (expected, found) = (self.end.digest.to_hex(), record.digest.to_hex());
+            let reason = format!("the stream's head has the digest {expected}, this is {found}");
+            return Err(ReadError::Seal { seq, reason });
+        }
+        Ok(record)
+    }
+}
+
+impl Iterator for Records {
+    type Item = Result<Record, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended || self.walk.last().seq >= self.end.seq {
+            return None;
+        }
+        let record = self.read_one();
+        self.ended = record.is_err();
+        Some(record)
+    }
+}
+
+type Entry = (::sled::IVec, ::sled::IVec);
+
+/// The next value; a panic of sled over a damaged page is an error like any other.
+fn next(values: &mut ::sled::Iter) -> Result<Option<Entry>, ReadError> {
+    let entry = guarded(|| values.next().transpose());
+    match entry {
+        Ok(Ok(entry)) => Ok(entry),
+        Ok(Err(error)) => Err(ReadError::Store { reason: error.to_string() }),
+        Err(reason) => Err(ReadError::Store { reason }),
+    }
+}
+
+fn foreign_key(key: &[u8]) -> ReadError {
+    ReadError::Store { reason: format!("{} bytes of a key that names no record", key.len()) }
+}
