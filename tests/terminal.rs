@@ -350,7 +350,8 @@ fn several_people_talk_to_one_service_at_once() {
     let serve: Vec<String> = serve.iter().map(|word| (*word).to_owned()).collect();
     let mut service = Live::start(&serve);
     let heard = service.heard();
-    let endpoint = heard.strip_prefix("serving at ").unwrap_or_else(|| panic!("{heard}")).to_owned();
+    let endpoint =
+        heard.strip_prefix("serving at ").unwrap_or_else(|| panic!("{heard}")).to_owned();
     let people: Vec<_> = ["ada", "bo", "cy"]
         .map(|user| {
             let endpoint = endpoint.clone();

@@ -15,7 +15,9 @@ pub fn choose(flag: Option<PathBuf>) -> Result<PathBuf, Failure> {
         }
         Some(directory) => Ok(directory),
         None => default(variable("XDG_DATA_HOME"), variable("HOME")).ok_or_else(|| {
-            Failure::bad_input("there is no home directory to keep data in; name one with --data DIR")
+            Failure::bad_input(
+                "there is no home directory to keep data in; name one with --data DIR",
+            )
         }),
     }
 }

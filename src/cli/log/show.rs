@@ -50,7 +50,8 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
             )],
         ),
         Event::EpisodeStarted(event) => {
-            let drawn = event.seed.map_or("a given scene".to_owned(), |seed| format!("seed {seed}"));
+            let drawn =
+                event.seed.map_or("a given scene".to_owned(), |seed| format!("seed {seed}"));
             let fewest = event.fewest.map_or(String::new(), |n| format!(", fewest actions {n}"));
             (event.goal.clone(), vec![format!("{drawn}{fewest}")])
         }

@@ -285,7 +285,10 @@ impl<'a> Conversation<'a> {
     }
 
     /// A refusal is told and over; a broken service ends the conversation.
-    pub(super) fn or_tell<T>(&mut self, result: Result<T, ClientError>) -> Result<Option<T>, Failure> {
+    pub(super) fn or_tell<T>(
+        &mut self,
+        result: Result<T, ClientError>,
+    ) -> Result<Option<T>, Failure> {
         match result {
             Ok(value) => Ok(Some(value)),
             Err(ClientError::Rejected { message, .. }) => {

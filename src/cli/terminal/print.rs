@@ -144,10 +144,9 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
     }
     lines.push(match &answer.outcome {
         Outcome::Understood { program, .. } => format!("So I did {program}."),
-        Outcome::Impossible { program, step, .. } => format!(
-            "So I took it to mean {program}, but step {} cannot be done here.",
-            step + 1
-        ),
+        Outcome::Impossible { program, step, .. } => {
+            format!("So I took it to mean {program}, but step {} cannot be done here.", step + 1)
+        }
         Outcome::NotSure => "So I was not sure, and did nothing.".to_owned(),
     });
     lines
@@ -284,8 +283,10 @@ pub fn one_line(lines: &[String]) -> String {
 /// What a person who comes back hears: where they are and what the robot has learned from them.
 pub fn welcome(user: &str, status: &Status) -> String {
     if status.episodes == 0 {
-        return format!("Hello, {user}! I know {}; you teach me the rest. :help says how.",
-            count(status.exemplars, "example"));
+        return format!(
+            "Hello, {user}! I know {}; you teach me the rest. :help says how.",
+            count(status.exemplars, "example")
+        );
     }
     let lessons = match status.lessons {
         0 => "no lesson yet".to_owned(),

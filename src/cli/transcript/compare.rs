@@ -9,11 +9,7 @@ const CONTEXT_LINES: usize = 3;
 impl Transcript {
     /// The transcript with its real answers. Lines whose answer agrees keep their own text when
     /// `keep_agreeing`, so that what differs from the written text is what really differs.
-    pub(super) fn with_answers(
-        &self,
-        played: &[(usize, Played)],
-        keep_agreeing: bool,
-    ) -> String {
+    pub(super) fn with_answers(&self, played: &[(usize, Played)], keep_agreeing: bool) -> String {
         let mut out: Vec<String> = Vec::new();
         let first_act = played.first().map_or(self.lines.len(), |(index, _)| *index);
         out.extend(self.lines[..first_act].iter().map(|line| line.text.clone()));
@@ -70,14 +66,13 @@ impl Transcript {
                 _ => None,
             })
             .collect();
-        let mut real = answers.iter().enumerate().map(|(place, (answer, text))| {
-            match written.get(place) {
+        let mut real =
+            answers.iter().enumerate().map(|(place, (answer, text))| match written.get(place) {
                 Some((expected, own)) if keep_agreeing && expected.expects(answer) => {
                     (*own).clone()
                 }
                 _ => text.clone(),
-            }
-        });
+            });
         if written.is_empty() {
             out.extend(&mut real);
         }

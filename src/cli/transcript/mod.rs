@@ -37,9 +37,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Play one against a fresh service and print it with the real answers.
-    Run {
-        file: PathBuf,
-    },
+    Run { file: PathBuf },
     /// Play each and print a diff of the answers that differ.
     Check {
         #[arg(required = true)]
