@@ -21,6 +21,8 @@ pub const PROGRAM_STEPS_MAX: usize = 128;
 pub const CANDIDATES_MAX: usize = 32;
 /// Combinations tried in the cross product of clauses.
 pub const COMBINATIONS_MAX: usize = 256;
+/// Choices of types tried for the names of one clause: the best, then the others that share a name.
+pub const TYPE_CHOICES_MAX: usize = 12;
 /// Exemplars shown as evidence.
 pub const EVIDENCE_NEAREST_MAX: usize = 3;
 /// Discarded candidates shown as evidence.
@@ -45,9 +47,10 @@ pub const CLIENT_IN_FLIGHT_MAX: usize = 64;
 /// Seconds during which a client retries a request.
 pub const CLIENT_RETRY_S_MAX: u64 = 60;
 
-/// Bytes of one `sled` value. Larger values go to blob files that are never fsynced
-/// (docs/adr: group commit), so anything larger is chunked.
-pub const STORE_VALUE_BYTES_MAX: usize = 8 * 1024;
+/// Bytes of one `sled` value. `sled` writes a page above 128 kB to a blob file that it never
+/// syncs, and a page holds up to 20 values: values of 8 kB do become blobs (a test of `store/`
+/// shows it), values of 4 kB cannot. Anything larger is chunked.
+pub const STORE_VALUE_BYTES_MAX: usize = 4 * 1024;
 /// Bytes of one record's body before sealing.
 pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
 /// Events of one batch: one command's worth.

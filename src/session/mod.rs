@@ -16,7 +16,6 @@ pub use apply::Divergence;
 pub use command::{Command, OnClash, Query};
 pub use rejection::{Rejection, RejectionCode};
 pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told, reply_of};
-pub use snapshot::SnapshotError;
 pub use state::{LiveLesson, State};
 
 use crate::events::{Batch, Durable, Head, Record};

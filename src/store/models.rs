@@ -67,3 +67,86 @@ fn place(stream: &StreamId, digest: Digest) -> Place<'static> {
     let key = [&stream.key.0[..], &digest.0].concat();
     Place { purpose: "apprentice 1: mind", shelf: shelf(stream), key, bound: Vec::new() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance::{batch, stream};
+    use super::super::{Store, open, open_memory};
+    use super::*;
+    use crate::events::Head;
+    use crate::limits::STORE_VALUE_BYTES_MAX;
+
+    /// Runs `check` on minds in memory and on disk.
+    fn on_both(check: impl Fn(&Store, &StreamId)) {
+        let dir = tempfile::tempdir().unwrap();
+        for store in [open_memory(), open(dir.path()).unwrap()] {
+            let ada = stream(&store.keys, "local", "ada");
+            store.log.append(&ada, Head::EMPTY, batch(["a"])).wait().unwrap();
+            check(&store, &ada);
+        }
+    }
+
+    #[test]
+    fn a_mind_of_any_size_is_found_by_its_digest() {
+        on_both(|store, ada| {
+            for length in [0, 1, STORE_VALUE_BYTES_MAX - 40, STORE_VALUE_BYTES_MAX, 900_000] {
+                let bytes: Vec<u8> = (0..length).map(|i| (i * 31 >> 3) as u8).collect();
+                let digest = Digest::of(&bytes);
+                assert_eq!(store.models.load(ada, digest), None);
+                store.models.put(ada, digest, &bytes).unwrap();
+                store.models.put(ada, digest, &bytes).unwrap();
+                assert_eq!(store.models.load(ada, digest), Some(bytes));
+            }
+            assert_eq!(store.models.ignored(), 0);
+        });
+    }
+
+    #[test]
+    fn bytes_that_are_not_what_the_digest_says_are_absent_and_counted() {
+        on_both(|store, ada| {
+            let digest = Digest::of(b"a good mind");
+            store.models.put(ada, digest, b"another mind").unwrap();
+            assert_eq!(store.models.load(ada, digest), None);
+            // Bytes damaged on their way do not open.
+            let shelf = shelf(ada);
+            store.models.put(ada, digest, b"a good mind").unwrap();
+            let mut entries = store.models.cache.scan(&shelf, &ada.key.0).unwrap();
+            entries[0].1[30] ^= 1;
+            store.models.cache.replace(&shelf, &ada.key.0, entries).unwrap();
+            assert_eq!(store.models.load(ada, digest), None);
+            assert_eq!(store.models.ignored(), 2);
+        });
+    }
+
+    #[test]
+    fn minds_are_sealed_and_belong_to_one_person() {
+        on_both(|store, ada| {
+            let words = b"chill the apple means open the fridge";
+            let digest = Digest::of(words);
+            store.models.put(ada, digest, words).unwrap();
+            for (_, value) in store.models.cache.scan(&shelf(ada), &[]).unwrap() {
+                assert!(!value.windows(5).any(|window| window == b"apple"));
+            }
+            let grace = stream(&store.keys, "local", "grace");
+            assert_eq!(store.models.load(&grace, digest), None);
+            assert!(store.models.put(&grace, digest, words).is_err(), "she has no key yet");
+            store.erase(ada).unwrap();
+            assert_eq!(store.models.load(ada, digest), None);
+            assert_eq!(store.models.cache.scan(&shelf(ada), &ada.key.0).unwrap(), []);
+        });
+    }
+
+    #[test]
+    fn old_minds_can_be_forgotten() {
+        on_both(|store, ada| {
+            let minds = [b"first".to_vec(), b"second".repeat(5_000), b"third".to_vec()];
+            let digests = minds.each_ref().map(|mind| Digest::of(mind));
+            for (mind, digest) in minds.iter().zip(digests) {
+                store.models.put(ada, digest, mind).unwrap();
+            }
+            store.models.keep_only(ada, &digests[1..]).unwrap();
+            let found = digests.map(|digest| store.models.load(ada, digest).is_some());
+            assert_eq!(found, [false, true, true]);
+        });
+    }
+}

@@ -245,3 +245,148 @@ impl Fail<'_> {
         OpenError::Database { dir: self.dir(), reason }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance::{batch, read_all, stream};
+    use super::*;
+    use crate::events::Head;
+
+    fn refusal(dir: &Path) -> String {
+        match open(dir) {
+            Err(error) => error.to_string(),
+            Ok(_) => panic!("{} was opened", dir.display()),
+        }
+    }
+
+    /// A directory with one record of one person of tenant `local`.
+    fn used() -> (tempfile::TempDir, StreamId) {
+        let dir = tempfile::tempdir().unwrap();
+        let store = open(dir.path()).unwrap();
+        let ada = stream(&store.keys, "local", "ada");
+        store.log.append(&ada, Head::EMPTY, batch(["a"])).wait().unwrap();
+        (dir, ada)
+    }
+
+    #[test]
+    fn a_directory_is_made_and_opened_again() {
+        let parent = tempfile::tempdir().unwrap();
+        let dir = parent.path().join("deep/er");
+        for _ in 0..2 {
+            open(&dir).unwrap();
+        }
+        let layout = fs::read_to_string(dir.join("LAYOUT")).unwrap();
+        assert_eq!(layout, "apprentice data directory, layout 1\n");
+        assert!(!dir.join("CREATING").exists());
+        assert!(dir.join("keys/local.key").exists());
+    }
+
+    #[test]
+    fn a_directory_in_use_is_refused_until_the_last_handle_is_gone() {
+        let (dir, _) = used();
+        let store = open(dir.path()).unwrap();
+        let error = refusal(dir.path());
+        assert!(error.contains("in use by another process"), "{error}");
+        assert!(error.contains(&dir.path().display().to_string()), "{error}");
+        assert!(copy_refused(dir.path()).contains("in use"));
+        let log = store.log.clone();
+        drop(store);
+        assert!(refusal(dir.path()).contains("in use"), "the log is still open");
+        drop(log);
+        open(dir.path()).unwrap();
+    }
+
+    fn copy_refused(dir: &Path) -> String {
+        super::super::copy_private(dir).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_no_data_directory_is_left_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("thesis.tex"), "...").unwrap();
+        assert!(refusal(dir.path()).contains("thesis.tex"));
+        let file = dir.path().join("thesis.tex");
+        assert!(refusal(&file).contains("cannot be used"));
+        assert!(copy_refused(&file).contains("cannot be used"));
+        let empty = tempfile::tempdir().unwrap();
+        assert!(copy_refused(empty.path()).contains("cannot be used"));
+        assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_layout_that_is_newer_or_damaged_is_refused() {
+        let (dir, _) = used();
+        for (text, part) in [
+            ("apprentice data directory, layout 2\n", "use a newer version"),
+            ("apprentice data directory, layout 1", "is damaged"),
+            ("apprentice data directory, layout 0\n", "is damaged"),
+            ("\u{0}", "is damaged"),
+        ] {
+            fs::write(dir.path().join("LAYOUT"), text).unwrap();
+            let error = refusal(dir.path());
+            assert!(error.contains(part), "{error}");
+        }
+        fs::remove_file(dir.path().join("LAYOUT")).unwrap();
+        assert!(refusal(dir.path()).contains("no file LAYOUT"));
+    }
+
+    #[test]
+    fn a_directory_whose_making_was_cut_short_is_made_again() {
+        let dir = tempfile::tempdir().unwrap();
+        drop(open(dir.path()).unwrap());
+        fs::remove_file(dir.path().join("LAYOUT")).unwrap();
+        fs::write(dir.path().join("CREATING"), "").unwrap();
+        drop(open(dir.path()).unwrap());
+        assert!(dir.path().join("LAYOUT").exists() && !dir.path().join("CREATING").exists());
+    }
+
+    #[test]
+    fn a_lost_tenant_key_is_never_replaced_by_a_new_one() {
+        let (dir, _) = used();
+        let path = dir.path().join("keys/local.key");
+        let key = fs::read(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        let error = refusal(dir.path());
+        assert!(error.contains("local.key") && error.contains("backup"), "{error}");
+        assert!(!path.exists());
+        write_whole(&path, &key).unwrap();
+        open(dir.path()).unwrap();
+    }
+
+    #[test]
+    fn a_damaged_cache_is_thrown_away() {
+        let (dir, ada) = used();
+        fs::write(dir.path().join("cache/db"), "this is no database").unwrap();
+        let store = open(dir.path()).unwrap();
+        assert_eq!(read_all(&*store.log, &ada).len(), 1);
+    }
+
+    #[test]
+    fn a_private_copy_shows_the_same_records_and_leaves_no_trace() {
+        let (dir, ada) = used();
+        let before = read_all(&*open(dir.path()).unwrap().log, &ada);
+        let listing = || {
+            let mut all = Vec::new();
+            let mut waiting = vec![dir.path().to_owned()];
+            while let Some(path) = waiting.pop() {
+                match path.is_dir() {
+                    true => waiting
+                        .extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path())),
+                    false => all.push((path.clone(), fs::read(&path).unwrap())),
+                }
+            }
+            all.sort();
+            all
+        };
+        let untouched = listing();
+        let copy = super::super::copy_private(dir.path()).unwrap();
+        let store = copy.open().unwrap();
+        assert_eq!(read_all(&*store.log, &ada), before);
+        let eve = StreamId { key: crate::ids::StreamKey([3; 16]), ..ada.clone() };
+        let refused = store.log.append(&eve, Head::EMPTY, batch(["new here"])).wait();
+        assert!(refused.is_err());
+        assert_eq!(listing(), untouched);
+        // The copy is no lock on the original.
+        open(dir.path()).unwrap();
+    }
+}

@@ -3,6 +3,8 @@
 mod cache;
 mod commit;
 mod read;
+#[cfg(test)]
+mod tests;
 
 pub(super) use self::cache::SledCache;
 

@@ -82,3 +82,46 @@ fn place(stream: &StreamId, version: Digest) -> Place<'static> {
         bound: version.0.to_vec(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance::{batch, stream};
+    use super::super::{Store, open, open_memory};
+    use super::*;
+
+    fn on_both(check: impl Fn(&Store, &StreamId, Head)) {
+        let dir = tempfile::tempdir().unwrap();
+        for store in [open_memory(), open(dir.path()).unwrap()] {
+            let ada = stream(&store.keys, "local", "ada");
+            let head = store.log.append(&ada, Head::EMPTY, batch(["a"])).wait().unwrap().head();
+            check(&store, &ada, head);
+        }
+    }
+
+    #[test]
+    fn the_latest_snapshot_is_found_with_its_head() {
+        on_both(|store, ada, head| {
+            let version = Digest::of(b"state 1");
+            assert_eq!(store.snapshots.latest::<Vec<String>>(ada, version), None);
+            let long = vec!["word".to_owned(); 20_000];
+            store.snapshots.put(ada, Head::EMPTY, version, &long).unwrap();
+            assert_eq!(store.snapshots.latest(ada, version), Some((Head::EMPTY, long)));
+            let short = vec!["later".to_owned()];
+            store.snapshots.put(ada, head, version, &short).unwrap();
+            assert_eq!(store.snapshots.latest(ada, version), Some((head, short)));
+            store.snapshots.forget(ada).unwrap();
+            assert_eq!(store.snapshots.latest::<Vec<String>>(ada, version), None);
+        });
+    }
+
+    #[test]
+    fn a_snapshot_of_another_version_or_shape_is_none() {
+        on_both(|store, ada, head| {
+            let version = Digest::of(b"state 1");
+            store.snapshots.put(ada, head, version, &vec![1_u32, 2]).unwrap();
+            assert_eq!(store.snapshots.latest::<Vec<u32>>(ada, Digest::of(b"state 2")), None);
+            assert_eq!(store.snapshots.latest::<String>(ada, version), None);
+            assert_eq!(store.snapshots.latest(ada, version), Some((head, vec![1_u32, 2])));
+        });
+    }
+}
