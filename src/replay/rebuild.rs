@@ -117,7 +117,8 @@ pub fn keep_snapshot<D: Domain>(
 /// Names the shape and the meaning of a state: another crate version, body version or world makes
 /// old snapshots absent.
 fn snapshot_version<D: Domain>(domain: &D) -> Digest {
-    let bodies: Vec<String> = EventKind::ALL.iter().map(|kind| kind.version().to_string()).collect();
+    let bodies: Vec<String> =
+        EventKind::ALL.iter().map(|kind| kind.version().to_string()).collect();
     let text = format!(
         "apprentice {} · bodies {} · {} {}",
         env!("CARGO_PKG_VERSION"),
@@ -161,11 +162,8 @@ pub fn mind_of<D: Domain>(
     let mind = match cached {
         Some(mind) => mind,
         None => {
-            let disagree = |recomputed| RebuildError::Mind {
-                stream: stream.clone(),
-                recorded,
-                recomputed,
-            };
+            let disagree =
+                |recomputed| RebuildError::Mind { stream: stream.clone(), recorded, recomputed };
             let trained = learning::train(domain, recipe, &session.trained_lessons())
                 .map_err(|error| disagree(error.to_string()))?;
             if trained.digest() != recorded {

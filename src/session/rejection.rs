@@ -89,6 +89,8 @@ impl Rejection {
             | Rejection::NotContiguous { .. }
             | Rejection::NoSuchAction { .. }
             | Rejection::NotAfter { .. } => RejectionCode::BadTeach,
+            // The code says that there is a choice; against a seed there is none.
+            Rejection::Clash { lesson: None, .. } => RejectionCode::BadTeach,
             Rejection::Clash { .. } => RejectionCode::Clash,
             Rejection::NoSuchLesson { .. } => RejectionCode::NoSuchLesson,
             Rejection::TooManyLessons | Rejection::EpisodeFull => RejectionCode::LimitReached,
