@@ -192,15 +192,14 @@ mod tests {
                 let mut expected = start.clone();
                 gemm_oracle(shape, &a, &b, &mut expected, sink);
                 for kernel in Kernel::available() {
-                    Kernel::force(Some(kernel));
-                    let mut found = start.clone();
-                    gemm(shape, &a, &b, &mut found, sink);
-                    assert_eq!(bits(&found), bits(&expected), "{kernel:?} {shape:?} {round}");
-                    let mut found = start.clone();
-                    gemm_transposed_a(shape, &a_transposed, &b, &mut found, sink);
-                    assert_eq!(bits(&found), bits(&expected), "{kernel:?} {shape:?} {round}");
+                    let (mut plain, mut transposed) = (start.clone(), start.clone());
+                    kernel.run(|| {
+                        gemm(shape, &a, &b, &mut plain, sink);
+                        gemm_transposed_a(shape, &a_transposed, &b, &mut transposed, sink);
+                    });
+                    assert_eq!(bits(&plain), bits(&expected), "{kernel:?} {shape:?} {round}");
+                    assert_eq!(bits(&transposed), bits(&expected), "{kernel:?} {shape:?} {round}");
                 }
-                Kernel::force(None);
             }
         }
     }

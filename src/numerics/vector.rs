@@ -122,18 +122,20 @@ mod tests {
             let b: Vec<f32> = (0..length).map(|_| rng.normal()).collect();
             let mut striped = [0.0f32; 8];
             let mut squares = [0.0f32; 8];
+            let mut plain = [0.0f32; 8];
             for i in 0..length {
                 striped[i % 8] += a[i] * b[i];
+                plain[i % 8] += a[i];
                 squares[i % 8] += (a[i] - b[i]) * (a[i] - b[i]);
             }
             let pairs =
                 |s: [f32; 8]| ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
             for kernel in Kernel::available() {
-                Kernel::force(Some(kernel));
-                assert_eq!(dot(&a, &b).to_bits(), pairs(striped).to_bits(), "{kernel:?} {length}");
-                assert_eq!(distance(&a, &b).to_bits(), pairs(squares).sqrt().to_bits());
+                let found = kernel.run(|| [dot(&a, &b), distance(&a, &b), sum(&a)]);
+                let expected = [pairs(striped), pairs(squares).sqrt(), pairs(plain)];
+                let bits = |numbers: [f32; 3]| numbers.map(f32::to_bits);
+                assert_eq!(bits(found), bits(expected), "{kernel:?} {length}");
             }
-            Kernel::force(None);
         }
     }
 

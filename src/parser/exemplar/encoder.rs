@@ -15,7 +15,6 @@ pub(super) struct Encoder {
     words: &'static WordTable,
     layout: Layout,
     sorts: Vec<String>,
-    parameters: Vec<f32>,
     /// Transformed positions with the bias in, `[POSITIONS_KEPT × hidden]`.
     positions: Vec<f32>,
 }
@@ -61,17 +60,18 @@ impl Encoder {
         let threshold = weights.threshold;
         fits(threshold.is_finite() && threshold >= 0.0, "the threshold is no distance")?;
         fits(weights.sorts.windows(2).all(|pair| pair[0] < pair[1]), "sorts are out of order")?;
-        let parameters = weights.parameters.0.clone();
         let mut encoded = Vec::new();
         encode_positions(settings, layout.dims, 0, POSITIONS_KEPT, &mut encoded);
         let mut positions = Vec::new();
-        transform_positions(layout, &parameters, &encoded, &mut positions);
+        transform_positions(layout, &weights.parameters, &encoded, &mut positions);
         let (settings, sorts) = (settings.clone(), weights.sorts.clone());
-        Ok(Encoder { settings, words, layout, sorts, parameters, positions })
+        Ok(Encoder { settings, words, layout, sorts, positions })
     }
 
     /// `[rows × embedding]`. What stands in one row does not depend on the others.
-    pub fn embed(&self, rows: &[Vec<Token>]) -> Vec<f32> {
+    ///
+    /// - `parameters`: of the weights that this encoder was made for.
+    pub fn embed(&self, parameters: &[f32], rows: &[Vec<Token>]) -> Vec<f32> {
         let batch = Batch::new(&self.settings, self.words, &self.sorts, rows);
         let mut longer = Vec::new();
         let positions = if batch.positions <= POSITIONS_KEPT {
@@ -80,12 +80,11 @@ impl Encoder {
             let mut encoded = Vec::new();
             let dims = self.layout.dims;
             encode_positions(&self.settings, dims, 0, batch.positions, &mut encoded);
-            transform_positions(self.layout, &self.parameters, &encoded, &mut longer);
+            transform_positions(self.layout, parameters, &encoded, &mut longer);
             &longer
         };
         let mut pass = Pass::default();
-        let settings = &self.settings;
-        forward(settings, self.layout, &self.parameters, &batch, positions, &mut pass);
+        forward(&self.settings, self.layout, parameters, &batch, positions, &mut pass);
         pass.embeddings
     }
 }

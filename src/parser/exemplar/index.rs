@@ -59,6 +59,11 @@ impl ExemplarIndex {
         found
     }
 
+    /// Every exemplar with its distance, in order of number.
+    pub fn every(&self, query: &[f32]) -> impl Iterator<Item = (u32, f32)> {
+        (0..self.points.nrows()).map(move |number| (number as u32, self.distance(query, number)))
+    }
+
     fn distance(&self, query: &[f32], number: usize) -> f32 {
         let row = self.points.row(number);
         distance(query, row.to_slice().expect("rows of a standard layout"))

@@ -73,8 +73,8 @@ pub struct ExemplarParser {
     encoder: Encoder,
     weights: ExemplarWeights,
     exemplars: Vec<Exemplar>,
-    /// Exemplars by exact lifted form, oldest first.
-    exact: BTreeMap<LiftedUtterance, Vec<u32>>,
+    /// Exemplar numbers by lifted form, then by age.
+    by_form: Vec<u32>,
     index: ExemplarIndex,
     nearest: usize,
 }
@@ -117,14 +117,13 @@ impl ExemplarParser {
         let encoder = Encoder::new(settings, words, &weights)?;
         let utterances = examples.iter().map(|exemplar| &exemplar.utterance);
         let rows: Vec<_> = utterances.map(|utterance| tokeniser.tokens(utterance)).collect();
-        let embeddings = encoder.embed(&rows);
+        let embeddings = encoder.embed(&weights.parameters, &rows);
         let index = ExemplarIndex::new(settings.embedding, embeddings)?;
-        let mut exact: BTreeMap<LiftedUtterance, Vec<u32>> = BTreeMap::new();
-        for (number, exemplar) in examples.iter().enumerate() {
-            exact.entry(exemplar.utterance.clone()).or_default().push(number as u32);
-        }
+        let mut by_form: Vec<u32> = (0..examples.len() as u32).collect();
+        // Stable: among equal forms the older stays first.
+        by_form.sort_by_key(|&number| &examples[number as usize].utterance);
         let (exemplars, nearest) = (examples.to_vec(), settings.nearest);
-        Ok(ExemplarParser { tokeniser, encoder, weights, exemplars, exact, index, nearest })
+        Ok(ExemplarParser { tokeniser, encoder, weights, exemplars, by_form, index, nearest })
     }
 
     pub fn weights(&self) -> &ExemplarWeights {
@@ -143,7 +142,21 @@ impl ExemplarParser {
 
     /// `[embedding]`; of length 1 where the settings say so.
     pub fn embed(&self, lifted: &LiftedUtterance) -> Vec<f32> {
-        self.encoder.embed(&[self.tokeniser.tokens(lifted)])
+        self.embed_all(&[lifted])
+    }
+
+    /// `[utterances × embedding]`; each row as [`ExemplarParser::embed`] gives it.
+    fn embed_all(&self, utterances: &[&LiftedUtterance]) -> Vec<f32> {
+        let rows: Vec<_> = utterances.iter().map(|u| self.tokeniser.tokens(u)).collect();
+        self.encoder.embed(&self.weights.parameters, &rows)
+    }
+
+    /// The exemplars of exactly this form, oldest first.
+    fn exact(&self, lifted: &LiftedUtterance) -> &[u32] {
+        let form = |number: &u32| &self.exemplars[*number as usize].utterance;
+        let start = self.by_form.partition_point(|number| form(number) < lifted);
+        let count = self.by_form[start..].partition_point(|number| form(number) == lifted);
+        &self.by_form[start..start + count]
     }
 
     fn near(&self, (number, distance): (u32, f32)) -> Near {
@@ -156,7 +169,10 @@ impl SemanticParser for ExemplarParser {
     fn parse(&self, clause: &Clause) -> Parse {
         let lifted = &clause.lifted;
         let threshold = self.threshold();
-        let exact = self.exact.get(lifted).map_or(&[][..], Vec::as_slice);
+        if lifted.words.is_empty() {
+            return Parse { threshold, ..Parse::default() };
+        }
+        let exact = self.exact(lifted);
         let found = self.index.near(&self.embed(lifted), threshold, self.nearest);
         let within = found.iter().copied().filter(|&(_, distance)| distance <= threshold);
         // An exact form comes first even where dropped stop words make others equally near.
@@ -165,7 +181,9 @@ impl SemanticParser for ExemplarParser {
         let mut exact_programs = 0;
         for (place, (number, distance)) in ordered.enumerate() {
             let program = &self.exemplars[number as usize].program;
-            if candidates.len() < CANDIDATES_MAX
+            // A program with more slots than there are mentions can never be filled.
+            if program.slots() <= lifted.slots()
+                && candidates.len() < CANDIDATES_MAX
                 && candidates.iter().all(|known| known.program != *program)
             {
                 candidates.push(Scored { program: program.clone(), distance, number });

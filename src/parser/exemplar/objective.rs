@@ -219,3 +219,106 @@ fn cross_entropy(probabilities: &[f32], truth: &[f32], weight: &[f32], weights: 
     }
     loss[0] * weights[0] + loss[1] * weights[1]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::LiftedUtterance;
+    use crate::numerics::Rng;
+    use crate::parser::WordTable;
+    use crate::parser::exemplar::batch::encode_positions;
+    use crate::parser::exemplar::tokens::Tokeniser;
+
+    fn check_gradients(settings: &ExemplarSettings) {
+        let words = WordTable::builtin("paper").unwrap();
+        let utterances = [
+            "wash the <obj>",
+            "rinse <obj> <obj> please",
+            "put the <obj> in the <color>",
+            "drop <obj> <obj=sink>",
+            "go <obj>",
+        ];
+        let tokeniser = Tokeniser::new(settings);
+        let rows = utterances.map(|text| tokeniser.tokens(&LiftedUtterance::parse(text)));
+        let sorts = ["color".to_owned(), "obj".to_owned()];
+        let batch = Batch::new(settings, words, &sorts, &rows);
+        let layout = Layout {
+            dims: words.dims(),
+            hidden: settings.hidden,
+            embedding: settings.embedding,
+            sorts: sorts.len(),
+        };
+        let mut encoded = Vec::new();
+        encode_positions(settings, layout.dims, 0, batch.positions, &mut encoded);
+        let mut objective = Objective::new(settings, layout, &batch, &[0, 0, 1, 1, 2], encoded);
+        let seed = 41;
+        println!("seed {seed}");
+        let mut rng = Rng::from_u64(seed);
+        let mut parameters: Vec<f32> = (0..layout.total()).map(|_| rng.normal() * 0.3).collect();
+        let [a, b] = layout.classifier();
+        (parameters[a], parameters[b]) = (2.0, -0.5);
+        let mut gradient = vec![0.0; layout.total()];
+        objective.evaluate(&parameters, &mut gradient);
+        let mut unused = gradient.clone();
+        let parts = [
+            layout.transform(),
+            layout.transform_bias(),
+            layout.first(),
+            layout.first_bias(),
+            layout.second(),
+            layout.second_bias(),
+            layout.sort(0),
+            layout.sort(1),
+            a..b + 1,
+        ];
+        for part in parts {
+            // The whole part along its own gradient: large against the rounding of f32, and every
+            // parameter has its say.
+            let length = gradient[part.clone()].iter().map(|g| g * g).sum::<f32>().sqrt();
+            assert!(length > 1e-6, "no gradient in {part:?}");
+            let step = 1e-3;
+            let mut moved = |by: f32| {
+                let mut moved = parameters.clone();
+                for at in part.clone() {
+                    moved[at] += by * gradient[at] / length;
+                }
+                objective.evaluate(&moved, &mut unused)
+            };
+            let slope = (moved(step) - moved(-step)) / (2.0 * step as f64);
+            let gap = (slope / length as f64 - 1.0).abs();
+            assert!(gap < 0.03, "{part:?}: slope {slope}, gradient {length}");
+        }
+    }
+
+    #[test]
+    fn gradients_agree_with_finite_differences() {
+        let small = ExemplarSettings { hidden: 12, embedding: 7, ..ExemplarSettings::default() };
+        check_gradients(&small);
+        check_gradients(&ExemplarSettings { normalise: false, ..small.clone() });
+        check_gradients(&ExemplarSettings { self_pairs: true, positions: false, ..small.clone() });
+        check_gradients(&ExemplarSettings { fixture_weight: 0.4, position_scale: 1.0, ..small });
+    }
+
+    #[test]
+    fn a_loss_summed_by_products_is_the_loss_summed_by_logarithms() {
+        let seed = 43;
+        println!("seed {seed}");
+        let mut rng = Rng::from_u64(seed);
+        let count = 1_003;
+        let given: Vec<f32> = (0..count).map(|_| rng.uniform()).collect();
+        let truth: Vec<f32> = (0..count).map(|_| (rng.below(5) == 0) as u8 as f32).collect();
+        let weight: Vec<f32> = (0..count).map(|_| (rng.below(3) > 0) as u8 as f32).collect();
+        let mut expected = 0.0;
+        for index in 0..count {
+            let positive = truth[index] == 1.0;
+            let share = if positive { 0.5 } else { 0.01 };
+            let loss = crate::numerics::bce(given[index], positive) as f64;
+            expected += weight[index] as f64 * share * loss;
+        }
+        let found = cross_entropy(&given, &truth, &weight, [0.5, 0.01]);
+        assert!((found / expected - 1.0).abs() < 1e-5, "{found} against {expected}");
+        let certain = vec![0.0; 80];
+        let found = cross_entropy(&certain, &[1.0; 80], &[1.0; 80], [1.0, 1.0]);
+        assert!((found / 80.0 - 16.118).abs() < 1e-2, "{found}");
+    }
+}

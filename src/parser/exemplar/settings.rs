@@ -77,7 +77,7 @@ impl Default for ExemplarSettings {
             learning_rate: 3e-3,
             weight_decay: 0.0,
             steps_max: 300,
-            stop_loss: 0.05,
+            stop_loss: 0.07,
             a_start: 5.0,
             b_start: -2.5,
             self_pairs: false,
@@ -85,7 +85,10 @@ impl Default for ExemplarSettings {
             normalise: true,
             positions: true,
             word_scale: 1.0,
-            position_scale: 1.0,
+            // At 1 the positions are longer than the words and drown them: on recorded sentences the
+            // best guess is right for 89 % of primitives against 90 %, and for 25 % of other
+            // people's wordings of a lesson against 40 %.
+            position_scale: 0.1,
             slot_words: BTreeMap::from([("obj".to_owned(), "object".to_owned())]),
             fixture_weight: 0.0,
             nearest: 3,

@@ -1,9 +1,13 @@
+use std::collections::BTreeSet;
+
 use super::{Calibration, ExemplarParser, ExemplarSettings, Figures, ThresholdReading};
 use crate::language::{LiftedProgram, LiftedUtterance};
 
 /// One comparison that the threshold would accept from `distance` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Trial {
+    /// The exemplar.
+    number: u32,
     distance: f32,
     right: bool,
 }
@@ -17,12 +21,21 @@ pub(super) fn calibrate(
     figures: &mut Figures,
 ) -> f32 {
     let Calibration { variants, unknown } = calibration;
-    let variant_trials: Vec<Vec<Trial>> = variants
-        .iter()
-        .map(|variant| trials(parser, &variant.utterance, Some(&variant.program)))
+    let asked = variants.iter().map(|variant| (&variant.utterance, Some(&variant.program)));
+    let variant_trials = trials(parser, asked.collect());
+    // Nobody asked what an unknown request means, only that the programs of the variants are no
+    // answer. Where a lesson is nearest, neither right nor wrong is known: it may be what the
+    // person taught. Counting it as wrong would narrow the threshold with every lesson.
+    let answered: BTreeSet<LiftedProgram> =
+        variants.iter().map(|variant| variant.program.canonical()).collect();
+    let asked = unknown.iter().map(|utterance| (utterance, None)).collect();
+    let unknown_trials: Vec<Vec<Trial>> = trials(parser, asked)
+        .into_iter()
+        .filter(|trials| {
+            let program = |trial: &Trial| &parser.exemplars[trial.number as usize].program;
+            trials.first().is_some_and(|trial| answered.contains(&program(trial).canonical()))
+        })
         .collect();
-    let unknown_trials: Vec<Vec<Trial>> =
-        unknown.iter().map(|utterance| trials(parser, utterance, None)).collect();
     // Trials are sorted: the first is the nearest exemplar, whose program would be the answer.
     let first = |trials: &[Vec<Trial>]| -> Vec<Trial> {
         trials.iter().filter_map(|trials| trials.first().copied()).collect()
@@ -62,27 +75,36 @@ pub(super) fn calibrate(
 /// Notes the share of exemplars whose nearest exemplar, the shortcut for exact forms aside, gives
 /// their own program: below 1 only where different programs look alike without stop words.
 pub(super) fn measure(parser: &ExemplarParser, figures: &mut Figures) {
-    let recalled = |exemplar: &&crate::language::Exemplar| {
-        let trials = trials(parser, &exemplar.utterance, Some(&exemplar.program));
-        trials.first().is_some_and(|trial| trial.right)
-    };
-    let count = parser.exemplars.iter().filter(recalled).count();
+    let exemplars = parser.exemplars.iter();
+    let asked = exemplars.map(|exemplar| (&exemplar.utterance, Some(&exemplar.program)));
+    let recalled = |trials: &&Vec<Trial>| trials.first().is_some_and(|trial| trial.right);
+    let count = trials(parser, asked.collect()).iter().filter(recalled).count();
     let share = count as f64 / parser.exemplars.len() as f64;
     figures.insert("self_recall".to_owned(), share);
 }
 
-/// The utterance against every exemplar, nearest first.
+/// Each utterance, with its right program if it has one, against every exemplar, nearest first.
 fn trials(
     parser: &ExemplarParser,
-    utterance: &LiftedUtterance,
-    program: Option<&LiftedProgram>,
-) -> Vec<Trial> {
-    let near = parser.index.near(&parser.embed(utterance), 0.0, parser.exemplars.len());
-    let trial = |(number, distance): (u32, f32)| {
-        let right = program == Some(&parser.exemplars[number as usize].program);
-        Trial { distance, right }
+    asked: Vec<(&LiftedUtterance, Option<&LiftedProgram>)>,
+) -> Vec<Vec<Trial>> {
+    let utterances: Vec<_> = asked.iter().map(|(utterance, _)| *utterance).collect();
+    let embeddings = parser.embed_all(&utterances);
+    let width = embeddings.len() / asked.len().max(1);
+    let against_all = |(embedding, (utterance, program)): (&[f32], (&LiftedUtterance, _))| {
+        let slots = utterance.slots();
+        let trial = |(number, distance): (u32, f32)| {
+            let found = &parser.exemplars[number as usize].program;
+            let right = program == Some(found);
+            // What the utterance's mentions cannot fill is never a candidate.
+            (found.slots() <= slots).then_some(Trial { number, distance, right })
+        };
+        let mut trials: Vec<Trial> = parser.index.every(embedding).filter_map(trial).collect();
+        // Stable: among equals the older exemplar stays first.
+        trials.sort_by(|one, two| one.distance.total_cmp(&two.distance));
+        trials
     };
-    near.into_iter().map(trial).collect()
+    embeddings.chunks_exact(width.max(1)).zip(asked).map(against_all).collect()
 }
 
 /// The largest distance at which at least `precision` of the trials within it are right.
@@ -120,7 +142,7 @@ mod tests {
     fn trials(text: &str) -> Vec<Trial> {
         let trial = |word: &str| {
             let (distance, right) = (word.trim_end_matches(['+', '-']), word.ends_with('+'));
-            Trial { distance: distance.parse().unwrap(), right }
+            Trial { number: 0, distance: distance.parse().unwrap(), right }
         };
         text.split_whitespace().map(trial).collect()
     }
