@@ -92,9 +92,9 @@ fn other_wordings_of_the_seeds_are_understood() {
 #[test]
 fn unknown_verbs_get_not_sure_with_the_nearest_exemplars_as_evidence() {
     let (parser, _) = trained(SEEDS);
-    let parse = parser.parse(&LiftedUtterance::parse("refrigerate the <obj>"));
+    let parse = parser.parse(&Clause::of(&LiftedUtterance::parse("refrigerate the <obj>")));
     assert_eq!(parse.candidates, []);
-    assert!(!parse.exact);
+    assert_eq!(parse.exact, 0);
     assert_eq!(parse.nearest.len(), 3);
     assert_eq!(parse.threshold, parser.threshold());
     assert!(parse.nearest[0].distance > parse.threshold);
@@ -110,8 +110,8 @@ fn one_example_is_enough_for_its_own_wording() {
     assert_eq!(answer(&before, "wash the <obj>"), None);
     let settings = ExemplarSettings { nearest: 25, ..ExemplarSettings::default() };
     let (after, figures) = trained_with(&settings, &format!("{SEEDS}\n{lesson}"));
-    let parse = after.parse(&LiftedUtterance::parse("wash the <obj>"));
-    assert!(parse.exact);
+    let parse = after.parse(&Clause::of(&LiftedUtterance::parse("wash the <obj>")));
+    assert!(parse.exact > 0);
     assert_eq!(parse.candidates[0].number, 24);
     assert_eq!(parse.candidates[0].distance, 0.0);
     assert_eq!(parse.nearest[0].number, 24);
@@ -120,7 +120,7 @@ fn one_example_is_enough_for_its_own_wording() {
     let answers = UNKNOWN.map(|text| {
         let lifted = LiftedUtterance::parse(text);
         let fits = |near: &Near| near.program.slots() <= lifted.slots();
-        after.parse(&lifted).nearest.into_iter().find(fits).unwrap().number
+        after.parse(&Clause::of(&lifted)).nearest.into_iter().find(fits).unwrap().number
     });
     assert_eq!(answers[0], 24);
     let counted = answers.iter().filter(|&&number| number != 24).count();
@@ -136,16 +136,16 @@ fn every_exemplar_gets_its_own_program_even_where_stop_words_hide_the_difference
     ";
     let (parser, figures) = trained(twins);
     for exemplar in parser.exemplars() {
-        let parse = parser.parse(&exemplar.utterance);
-        assert!(parse.exact);
+        let parse = parser.parse(&Clause::of(&exemplar.utterance));
+        assert!(parse.exact > 0);
         assert_eq!(parse.candidates[0].program, exemplar.program);
         assert_eq!(parse.candidates.len(), 3, "the others are as near");
     }
     assert!((figures["self_recall"] - 1.0 / 3.0).abs() < 1e-9);
     // Nobody's wording: the oldest of the three comes first.
-    let parse = parser.parse(&LiftedUtterance::parse("turn off the <obj>"));
+    let parse = parser.parse(&Clause::of(&LiftedUtterance::parse("turn off the <obj>")));
     assert_eq!(parse.candidates[0].number, 0);
-    assert!(!parse.exact);
+    assert_eq!(parse.exact, 0);
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn candidates_are_distinct_and_can_be_filled() {
         &ExemplarSettings { beta: 2.0, ..ExemplarSettings::default() },
         &format!("{SEEDS}\n place the <obj> left of <obj> on <obj> := PUT <obj:1> <obj:3>"),
     );
-    let parse = parser.parse(&LiftedUtterance::parse("fetch the <obj>"));
+    let parse = parser.parse(&Clause::of(&LiftedUtterance::parse("fetch the <obj>")));
     let programs: Vec<_> = parse.candidates.iter().map(|c| c.program.to_string()).collect();
     // Everything is near enough, and one mention fills one slot.
     assert_eq!(programs.len(), 5, "{programs:?}");
@@ -236,7 +236,11 @@ fn a_restored_parser_answers_like_the_trained_one() {
     for text in ["fetch the <obj>", "put the <obj> on the <obj>", "", "zonk", "<color> <obj=sink>"]
     {
         let lifted = LiftedUtterance::parse(text);
-        assert_eq!(restored.parse(&lifted), parser.parse(&lifted), "{text}");
+        assert_eq!(
+            restored.parse(&Clause::of(&lifted)),
+            parser.parse(&Clause::of(&lifted)),
+            "{text}"
+        );
     }
     let refuse = |weights: ExemplarWeights| {
         let examples = exemplars(SEEDS);
