@@ -5,7 +5,7 @@ use crate::language::{
     Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
-use crate::world::Domain;
+use crate::world::{Domain, Infeasible};
 
 /// A lifted program that the parser offers for a clause.
 #[derive(Debug, Clone)]
@@ -188,25 +188,36 @@ impl<D: Domain> Ground<'_, D> {
     ) -> Result<(), (u32, String)> {
         let (domain, task) = (self.moment.domain, self.moment.task);
         let before = steps.len();
-        if self.execution.polarity
-            && let Some((step, reason)) = domain.contradiction(scene, &offer.clause.words, program)
-        {
-            return Err(((before + step) as u32, reason));
+        let contradicted = |scene: &D::Scene, from: usize| {
+            let rest = Program { steps: program.steps[from..].to_vec() };
+            if !self.execution.polarity {
+                return None;
+            }
+            let (step, reason) = domain.contradiction(scene, &offer.clause.words, &rest)?;
+            Some(((before + from + step) as u32, reason))
+        };
+        if let Some(contradiction) = contradicted(scene, 0) {
+            return Err(contradiction);
         }
         for (index, step) in program.steps.iter().enumerate() {
-            if steps.len() >= PROGRAM_STEPS_MAX {
-                return Err(((before + index) as u32, "the program is too long".to_owned()));
-            }
             let refused = |reason| ((before + index) as u32, reason);
+            if steps.len() >= PROGRAM_STEPS_MAX {
+                return Err(refused("the program is too long".to_owned()));
+            }
             domain.signature().check(step).map_err(refused)?;
-            let done = domain.step(scene, task, step).or_else(|refusal| {
-                let first = refusal.first.as_ref().filter(|_| self.execution.approach);
-                let Some(first) = first else { return Err(refusal) };
-                let bound = domain.step(scene, task, first)?;
+            let mut done = domain.step(scene, task, step);
+            if let Err(Infeasible { first: Some(first), .. }) = &done
+                && self.execution.approach
+                && let Ok(bound) = domain.step(scene, task, first)
+            {
                 steps.push(first.clone());
                 bindings.push(bound);
-                domain.step(scene, task, step)
-            });
+                // What was too far away to contradict the words is near now.
+                if let Some(contradiction) = contradicted(scene, index) {
+                    return Err(contradiction);
+                }
+                done = domain.step(scene, task, step);
+            }
             bindings.push(done.map_err(|refusal| refused(refusal.reason))?);
             steps.push(step.clone());
         }
