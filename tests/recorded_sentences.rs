@@ -5,10 +5,12 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
 
 use apprentice::grounding::Moment;
 use apprentice::language::{Outcome, Program, Step, Utterance};
-use apprentice::learning::{Mind, Recipe, train};
+use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::world::household::{Household, Room, Scene, SceneBuilder, Task};
 use apprentice::world::{Domain, Stage};
 use serde::Deserialize;
@@ -19,6 +21,7 @@ const SENTENCES: usize = 100;
 #[derive(Deserialize)]
 struct Row {
     u: String,
+    act: String,
     prims: Option<Vec<String>>,
     core: Option<String>,
     suspect: Option<bool>,
@@ -28,6 +31,25 @@ struct Case {
     utterance: Utterance,
     right: Step,
     scene: Scene,
+}
+
+/// Recorded sentences for washing, heating and cooling, with what they stand for.
+fn lessons(path: &Path, count: usize) -> Vec<Lesson<Scene, Task>> {
+    let household = Household::new();
+    let file = std::fs::File::open(path).unwrap();
+    let rows = BufReader::new(flate2::read::GzDecoder::new(file)).lines();
+    let rows = rows.map(|line| serde_json::from_str::<Row>(&line.unwrap()).unwrap());
+    let taught = ["CleanObject", "HeatObject", "CoolObject"];
+    let kept = rows.filter(|row| row.suspect != Some(true) && taught.contains(&row.act.as_str()));
+    let short = kept.filter(|row| row.u.split(' ').count() <= 9);
+    let lesson = |(index, row): (usize, Row)| {
+        let program = row.prims?.join("; ").parse::<Program>().ok()?;
+        let (scene, task) = household.stage(&Stage::Seed { seed: index as u64 }).ok()?;
+        let utterance = Utterance::new(&row.u).ok()?;
+        let (scene, task) = (Arc::new(scene), Arc::new(task));
+        Some(Lesson { utterance, program, scene, task, mentioned: None })
+    };
+    short.step_by(9).enumerate().filter_map(lesson).take(count).collect()
 }
 
 #[derive(Default)]
@@ -171,5 +193,45 @@ fn recorded_sentences_are_understood_or_honestly_declined() {
         }
         assert!(sum(|t| t.right) >= right_min * count, "{name} understands too little");
         assert!(sum(|t| t.wrong) <= wrong_max * count, "{name} does too much that nobody asked");
+    }
+}
+
+#[test]
+fn many_lessons_leave_the_simple_requests_understood() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let path = data.join("alfred_utterances.jsonl.gz");
+    if !path.exists() {
+        println!("skipped: there are no recorded sentences at {}", path.display());
+        return;
+    }
+    let cases = cases(&path);
+    let lessons = lessons(&path, 56);
+    assert_eq!(lessons.len(), 56);
+    let household = Household::new();
+    for name in ["paper", "default"] {
+        let recipe = Recipe::parse(Recipe::builtin(name).unwrap()).unwrap();
+        let start = Instant::now();
+        let base = train(&household, &recipe, &[]).unwrap();
+        let base_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let mind = train(&household, &recipe, &lessons).unwrap();
+        let train_ms = start.elapsed().as_secs_f64() * 1e3;
+        let right =
+            |tallies: BTreeMap<String, Tally>| tallies.values().map(|t| t.right).sum::<usize>();
+        let before = right(measure(&base, &cases, false));
+        let start = Instant::now();
+        let after = measure(&mind, &cases, false);
+        let interpret_us = start.elapsed().as_secs_f64() * 1e6 / cases.len() as f64;
+        let wrong = after.values().map(|t| t.wrong).sum::<usize>();
+        let after = right(after);
+        println!(
+            "{name}: base mind in {base_ms:.0} ms, with 56 lessons in {train_ms:.0} ms, one answer \
+             in {interpret_us:.0} us; of {} sentences {before} right before and {after} after the \
+             lessons, {wrong} wrong; {:?}",
+            cases.len(),
+            mind.report()
+        );
+        let half = before / 2;
+        assert!(after > half, "{name}: lessons make simple requests fail: {before} to {after}");
     }
 }
