@@ -287,3 +287,21 @@ fn an_embedding_does_not_depend_on_what_is_embedded_beside_it() {
         assert!((crate::numerics::norm(&alone) - 1.0).abs() < 1e-6);
     }
 }
+
+#[test]
+fn no_utterance_upsets_the_parser() {
+    let (parser, _) = trained(SEEDS);
+    let seed = 53;
+    println!("seed {seed}");
+    let mut rng = crate::numerics::Rng::from_u64(seed);
+    let words =
+        ["go", "<obj>", "<color=red>", "🍵", "the", "ÄÖ", "<>", "<=>", ",", "a\u{301}", "put"];
+    for _ in 0..300 {
+        let length = rng.below(200);
+        let text: Vec<&str> = (0..length).map(|_| words[rng.below(words.len())]).collect();
+        let parse = parser.parse(&LiftedUtterance::parse(&text.join(" ")));
+        assert!(parse.candidates.iter().all(|c| c.distance <= parse.threshold), "{text:?}");
+        assert!(parse.nearest.iter().all(|near| near.distance.is_finite()), "{text:?}");
+        assert_eq!(parse.nearest.is_empty(), text.is_empty());
+    }
+}
