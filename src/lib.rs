@@ -26,3 +26,4 @@ pub mod store;
 pub mod actors;
 pub mod cli;
 pub mod frontends;
+pub mod service;

@@ -1,1 +1,18 @@
-//! (being built)
+//! The command line: one file per command, and the conversation in a terminal.
+
+mod args;
+mod converse;
+mod data_dir;
+mod embedded;
+mod failure;
+mod log;
+mod logging;
+mod recipe;
+mod serve;
+mod talk;
+mod terminal;
+mod transcript;
+
+pub use args::main;
+pub use failure::Failure;
+pub use transcript::{PlayedFile, TranscriptFile};

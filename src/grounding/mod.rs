@@ -1,5 +1,27 @@
 //! Everything that needs both the utterance and the scene: from words to *this* mug.
+//!
+//! [`Interpreter::interpret`] is the pipeline: abstract, parse, resolve, combine, keep what runs,
+//! rerank.
 
+mod abstractor;
+#[cfg(test)]
+pub(crate) mod bench;
+mod combine;
+mod interpret;
 mod moment;
+mod names;
+mod rerank_training;
+mod reranker;
+mod resolver;
+mod settings;
+#[cfg(test)]
+mod tests;
 
+pub use abstractor::{Abstracted, Abstractor, without_locations};
+pub use combine::{Candidate, Verdict};
+pub use interpret::Interpreter;
 pub use moment::Moment;
+pub use rerank_training::{Choice, RerankerFigures};
+pub use reranker::{Featured, Reranker, RerankerSettings, RerankerWeights, featured};
+pub use resolver::{Referents, resolve};
+pub use settings::{Abstraction, Execution, Split};

@@ -1,6 +1,7 @@
 //! What people say and what programs are, before any meaning is guessed. Domain-neutral.
 
 mod answer;
+mod clause;
 mod document;
 mod lifted;
 mod program;
@@ -9,6 +10,7 @@ mod symbol;
 mod utterance;
 
 pub use answer::{Answer, Discarded, Evidence, Near, Outcome};
+pub use clause::Clause;
 pub use document::Document;
 pub use lifted::{Exemplar, LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Mention, Word};
 pub use program::{Program, ProgramError, Step};

@@ -1,9 +1,11 @@
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::language::{Program, Symbol, Utterance};
 
 /// One taught decomposition, with what its lifting depends on. `S` is the domain's scene.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lesson<S, T> {
     pub utterance: Utterance,
     /// Ground: object types, no slots.

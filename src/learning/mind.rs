@@ -1,49 +1,23 @@
-use crate::grounding::Moment;
+use super::bundle::{self, Bundle};
+use super::lift::lift;
+use super::parsing::AnyParser;
+use super::{Lesson, Recipe, Report, TrainError};
+use crate::grounding::{Interpreter, Moment, Reranker};
 use crate::ids::Digest;
 use crate::language::{Answer, Exemplar, Utterance};
-use crate::learning::{Lesson, Recipe, Report, TrainError};
 use crate::world::Domain;
 
 /// Parser, reranker and threshold, ready to use. A pure function of the recipe and the lessons.
-#[derive(Debug)]
-pub struct Mind {}
-
-impl Mind {
-    /// BLAKE3 over [`Mind::to_bytes`].
-    pub fn digest(&self) -> Digest {
-        unimplemented!()
-    }
-    pub fn recipe(&self) -> Digest {
-        unimplemented!()
-    }
-    pub fn report(&self) -> &Report {
-        unimplemented!()
-    }
-    pub fn to_bytes(&self) -> Vec<u8> {
-        unimplemented!()
-    }
-    pub fn from_bytes<D: Domain>(
-        _domain: &D,
-        _recipe: &Recipe,
-        _bytes: &[u8],
-    ) -> Result<Mind, TrainError> {
-        unimplemented!()
-    }
-    pub fn interpret<D: Domain>(&self, _moment: Moment<'_, D>, _utterance: &Utterance) -> Answer {
-        unimplemented!()
-    }
-    /// Seeds first, then lessons in order; the lesson's index is 0-based.
-    pub fn exemplars(&self) -> Vec<(Exemplar, Option<usize>)> {
-        unimplemented!()
-    }
-    /// Another program that the lesson's lifted form already stands for: the exemplar's number.
-    pub fn clash<D: Domain>(
-        &self,
-        _domain: &D,
-        _lesson: &Lesson<D::Scene, D::Task>,
-    ) -> Option<Clash> {
-        unimplemented!()
-    }
+#[derive(Debug, Clone)]
+pub struct Mind {
+    pub(super) recipe: Recipe,
+    pub(super) parser: AnyParser,
+    /// None before the first lesson.
+    pub(super) reranker: Option<Reranker>,
+    /// How many of the exemplars, from the first, are seeds.
+    pub(super) seeds: u32,
+    pub(super) report: Report,
+    digest: Digest,
 }
 
 /// What a new lesson collides with.
@@ -54,10 +28,131 @@ pub struct Clash {
     pub lesson: Option<usize>,
 }
 
-pub fn train<D: Domain>(
-    _domain: &D,
-    _recipe: &Recipe,
-    _lessons: &[Lesson<D::Scene, D::Task>],
-) -> Result<Mind, TrainError> {
-    unimplemented!()
+impl Mind {
+    pub(super) fn new(
+        recipe: Recipe,
+        parser: AnyParser,
+        reranker: Option<Reranker>,
+        seeds: u32,
+        report: Report,
+    ) -> Mind {
+        let digest = Digest::ZERO;
+        let mut mind = Mind { recipe, parser, reranker, seeds, report, digest };
+        mind.digest = Digest::of(&mind.to_bytes());
+        mind
+    }
+
+    /// BLAKE3 over [`Mind::to_bytes`].
+    pub fn digest(&self) -> Digest {
+        self.digest
+    }
+
+    /// The digest of the recipe it was trained with.
+    pub fn recipe(&self) -> Digest {
+        self.recipe.digest()
+    }
+
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Everything that training found, in MessagePack; see [`Mind::from_bytes`]. The word table
+    /// and the recipe's settings are not in it.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        bundle::encode(&Bundle {
+            version: Bundle::VERSION,
+            recipe: self.recipe.digest(),
+            seeds: self.seeds,
+            exemplars: self.parser.exemplars().to_vec(),
+            parser: self.parser.weights(),
+            reranker: self.reranker.as_ref().map(|reranker| reranker.weights().clone()),
+            report: self.report.clone(),
+        })
+    }
+
+    /// The mind that [`Mind::to_bytes`] wrote, with the same digest.
+    ///
+    /// - errors: bytes that are no mind, of another version, of another recipe or other seeds, or
+    ///   whose parts do not fit together. Never panics, whatever the bytes.
+    pub fn from_bytes<D: Domain>(
+        domain: &D,
+        recipe: &Recipe,
+        bytes: &[u8],
+    ) -> Result<Mind, TrainError> {
+        let Bundle { version: _, recipe: of, seeds, exemplars, parser, reranker, report } =
+            bundle::decode(bytes)?;
+        if of != recipe.digest() {
+            let reason = format!(
+                "the mind was trained with the recipe {}, not with {} ({})",
+                of.short(),
+                recipe.digest().short(),
+                recipe.name()
+            );
+            return Err(TrainError::Unreadable { reason });
+        }
+        let known = &domain.seeds().exemplars;
+        if seeds as usize != known.len() || exemplars.get(..known.len()) != Some(&known[..]) {
+            let reason = format!("the mind was trained on other seeds than the {}'s", domain.id());
+            return Err(TrainError::Unreadable { reason });
+        }
+        let parser = AnyParser::restore(recipe, &exemplars, parser)?;
+        let features = domain.feature_count();
+        let restore = |weights| Reranker::restore(recipe.words(), weights, features);
+        let reranker = reranker.map(restore).transpose();
+        let reranker = reranker.map_err(|reason| TrainError::Unreadable { reason })?;
+        let mind = Mind::new(recipe.clone(), parser, reranker, seeds, report);
+        // A second encoding of the same mind would have a second digest.
+        if mind.digest != Digest::of(bytes) {
+            let reason = "the bytes are no mind as this binary writes it".to_owned();
+            return Err(TrainError::Unreadable { reason });
+        }
+        Ok(mind)
+    }
+
+    /// What the utterance asks for at this moment; see [`Interpreter::interpret`].
+    pub fn interpret<D: Domain>(&self, moment: Moment<'_, D>, utterance: &Utterance) -> Answer {
+        let known = |word: &str| self.recipe.words().lookup(word).is_some();
+        self.interpreter(&known).interpret(&moment, utterance)
+    }
+
+    pub(super) fn interpreter<'a>(
+        &'a self,
+        known: &'a dyn Fn(&str) -> bool,
+    ) -> Interpreter<'a, AnyParser> {
+        let settings = self.recipe.settings();
+        Interpreter {
+            abstraction: &settings.abstraction,
+            execution: &settings.execution,
+            parser: &self.parser,
+            known,
+            reranker: self.reranker.as_ref(),
+            seeds: self.seeds,
+        }
+    }
+
+    /// Seeds first, then lessons in order; the lesson's index is 0-based.
+    pub fn exemplars(&self) -> Vec<(Exemplar, Option<usize>)> {
+        let numbered = self.parser.exemplars().iter().enumerate();
+        numbered.map(|(number, exemplar)| (exemplar.clone(), self.lesson_of(number))).collect()
+    }
+
+    /// Another program that the lesson's lifted form already stands for: the oldest exemplar that
+    /// says so. Two programs for one form cannot both be recalled.
+    pub fn clash<D: Domain>(
+        &self,
+        domain: &D,
+        lesson: &Lesson<D::Scene, D::Task>,
+    ) -> Option<Clash> {
+        let new = lift(domain, &self.recipe, lesson);
+        // Not the canonical programs: for the same words, "1 onto 2" and "2 onto 1" do collide.
+        let collides =
+            |old: &Exemplar| old.utterance == new.utterance && old.program != new.program;
+        let number = self.parser.exemplars().iter().position(collides)?;
+        let exemplar = self.parser.exemplars()[number].clone();
+        Some(Clash { exemplar, lesson: self.lesson_of(number) })
+    }
+
+    fn lesson_of(&self, number: usize) -> Option<usize> {
+        number.checked_sub(self.seeds as usize)
+    }
 }

@@ -1,9 +1,20 @@
 //! The pure function from a recipe and an ordered list of lessons to a mind.
 
+mod bundle;
+mod error;
+mod history;
 mod lesson;
+mod lift;
 mod mind;
-mod recipe;
+mod parsing;
+pub mod recipe;
+#[cfg(test)]
+mod tests;
+mod train;
 
+pub use error::TrainError;
 pub use lesson::Lesson;
-pub use mind::{Clash, Mind, train};
-pub use recipe::{Recipe, RecipeError, Report, TrainError};
+pub use lift::lift;
+pub use mind::{Clash, Mind};
+pub use recipe::{Recipe, RecipeError, Report};
+pub use train::train;

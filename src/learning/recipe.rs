@@ -1,11 +1,81 @@
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
+use crate::grounding::{Abstraction, Execution, RerankerSettings};
 use crate::ids::Digest;
+use crate::language::Document;
+use crate::numerics::NumericsVersion;
+use crate::parser::{ExemplarSettings, WordTable};
 
-/// Settings only, with a digest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Recipe {}
+/// Settings only, with a digest: everything that decides what a mind becomes, beside the lessons.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    name: String,
+    settings: RecipeSettings,
+    words: &'static WordTable,
+    digest: Digest,
+}
 
+/// The sections of a recipe file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecipeSettings {
+    pub words: WordSettings,
+    pub abstraction: Abstraction,
+    pub lifting: Lifting,
+    pub execution: Execution,
+    pub parser: ParserSettings,
+    pub reranker: RerankerSettings,
+}
+
+/// Which word vectors.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WordSettings {
+    /// The name of a table that ships.
+    pub table: String,
+}
+
+/// How lessons become exemplars.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lifting {
+    /// What was in the hand and not mentioned becomes `<held>` in the lifted program; otherwise
+    /// it stays the object that it was, as in the paper.
+    pub held: bool,
+}
+
+/// Which parser, and its settings in the section of the same name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParserSettings {
+    pub kind: ParserKind,
+    pub exemplar: ExemplarSettings,
+}
+
+/// The parsers there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ParserKind {
+    /// The paper's: an embedding network and the nearest exemplars.
+    Exemplar,
+}
+
+/// A recipe file as it stands: its name is no setting and not part of the digest.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecipeFile {
+    name: String,
+    words: WordSettings,
+    abstraction: Abstraction,
+    lifting: Lifting,
+    execution: Execution,
+    parser: ParserSettings,
+    reranker: RerankerSettings,
+}
+
+/// Where a recipe file is wrong: a sentence with what was expected there.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the recipe has an error at line {line}, column {column}: {reason}")]
 pub struct RecipeError {
@@ -14,34 +84,205 @@ pub struct RecipeError {
     pub reason: String,
 }
 
+const PAPER: &str = include_str!("../../data/recipes/paper.toml");
+const DEFAULT: &str = include_str!("../../data/recipes/default.toml");
+/// Trains in a few milliseconds, for tests and simulations.
+const TINY: &str = include_str!("../../data/recipes/tiny.toml");
+
 impl Recipe {
-    /// The names of the recipes that ship.
+    /// The names of the recipes that ship for people; `tiny` is for tests.
     pub const BUILTIN: [&'static str; 2] = ["default", "paper"];
+
     /// The TOML text of a recipe that ships.
-    pub fn builtin(_name: &str) -> Option<&'static str> {
-        unimplemented!()
+    pub fn builtin(name: &str) -> Option<&'static str> {
+        match name {
+            "default" => Some(DEFAULT),
+            "paper" => Some(PAPER),
+            "tiny" => Some(TINY),
+            _ => None,
+        }
     }
-    pub fn parse(_toml: &str) -> Result<Recipe, RecipeError> {
-        unimplemented!()
+
+    /// - errors: [`RecipeError`], for text that is no TOML, an unknown or missing field, a value
+    ///   out of range, or an unknown word table.
+    pub fn parse(toml: &str) -> Result<Recipe, RecipeError> {
+        let file: RecipeFile = toml::from_str(toml).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            at(toml, start, error.message().trim().replace('\n', "; "))
+        })?;
+        let RecipeFile { name, words, abstraction, lifting, execution, parser, reranker } = file;
+        let settings = RecipeSettings { words, abstraction, lifting, execution, parser, reranker };
+        check_name(&name).map_err(|reason| at(toml, locate(toml, "", "name"), reason))?;
+        settings
+            .check()
+            .map_err(|(section, field, reason)| at(toml, locate(toml, section, field), reason))?;
+        let words = WordTable::builtin(&settings.words.table).ok_or_else(|| {
+            let found = &settings.words.table;
+            let reason =
+                format!("there is no word table {found:?}; expected \"paper\" or \"default\"");
+            at(toml, locate(toml, "words", "table"), reason)
+        })?;
+        let digest = settings.digest(words);
+        Ok(Recipe { name, settings, words, digest })
     }
+
     pub fn name(&self) -> &str {
-        unimplemented!()
+        &self.name
     }
+
+    pub fn settings(&self) -> &RecipeSettings {
+        &self.settings
+    }
+
+    pub fn words(&self) -> &'static WordTable {
+        self.words
+    }
+
+    /// BLAKE3 over the settings in a canonical form, the word table's digest and the version of
+    /// the arithmetic. The name and the file's comments do not count.
     pub fn digest(&self) -> Digest {
-        unimplemented!()
+        self.digest
     }
 }
 
+impl PartialEq for Recipe {
+    fn eq(&self, other: &Recipe) -> bool {
+        self.name == other.name && self.digest == other.digest
+    }
+}
+
+impl RecipeSettings {
+    fn digest(&self, words: &WordTable) -> Digest {
+        let mut hasher = blake3::Hasher::new_derive_key("apprentice 2026 recipe");
+        hasher.update(&NumericsVersion::CURRENT.0.to_be_bytes());
+        hasher.update(&words.digest().0);
+        hasher.update(&Document::of(self).digest().0);
+        Digest(*hasher.finalize().as_bytes())
+    }
+
+    /// - errors: section, field and what was expected.
+    fn check(&self) -> Result<(), (&'static str, &'static str, String)> {
+        let reranker = &self.reranker;
+        let size = |field, value: usize, max: usize| {
+            let reason = || format!("{field} is {value}; expected a number between 1 and {max}");
+            (1..=max).contains(&value).then_some(()).ok_or_else(|| ("reranker", field, reason()))
+        };
+        size("hidden", reranker.hidden, 512)?;
+        size("symbol", reranker.symbol, 512)?;
+        size("steps_max", reranker.steps_max, 100_000)?;
+        let real = |field, value: f32, max: f32| {
+            let reason = || format!("{field} is {value}; expected a number between 0 and {max}");
+            (0.0..=max).contains(&value).then_some(()).ok_or_else(|| ("reranker", field, reason()))
+        };
+        real("learning_rate", reranker.learning_rate, 1.0)?;
+        real("stop_below", reranker.stop_below, 100.0)?;
+        self.parser.exemplar.check().map_err(|fault| match fault {
+            crate::parser::TrainFault::Setting { field, .. } => {
+                ("parser.exemplar", field, fault.to_string())
+            }
+            other => ("parser.exemplar", "", other.to_string()),
+        })
+    }
+}
+
+fn check_name(name: &str) -> Result<(), String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if (1..=64).contains(&name.len()) && name.chars().all(plain) {
+        return Ok(());
+    }
+    Err(format!("{name:?} is no name: expected 1 to 64 letters, digits, hyphens or underscores"))
+}
+
+fn at(toml: &str, start: usize, reason: String) -> RecipeError {
+    let before = toml.get(..start).unwrap_or(toml);
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+    RecipeError { line, column, reason }
+}
+
+/// Where a section's field stands in the text; the section's head when the field is not written
+/// out, the beginning when neither is.
+fn locate(toml: &str, section: &str, field: &str) -> usize {
+    let head = format!("[{section}]");
+    let mut inside = section.is_empty();
+    let mut found = 0;
+    let mut start = 0;
+    for line in toml.split_inclusive('\n') {
+        let text = line.trim_start();
+        let indent = line.len() - text.len();
+        if text.starts_with('[') {
+            inside = text.starts_with(&head);
+            if inside {
+                found = start + indent;
+            }
+        } else if inside
+            && text.strip_prefix(field).is_some_and(|rest| rest.trim_start().starts_with('='))
+        {
+            return start + indent;
+        }
+        start += line.len();
+    }
+    found
+}
+
 /// What a training measured about itself.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Report {
+    /// Seeds and lessons.
     pub exemplars: u32,
     pub threshold: f32,
     pub figures: BTreeMap<String, f64>,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum TrainError {
-    #[error("training failed: {reason}")]
-    Failed { reason: String },
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_recipes_that_ship_are_whole_and_differ() {
+        let digests: Vec<Digest> = ["default", "paper", "tiny"]
+            .map(|name| {
+                let recipe = Recipe::parse(Recipe::builtin(name).unwrap()).unwrap();
+                assert_eq!(recipe.name(), name);
+                recipe.digest()
+            })
+            .to_vec();
+        assert!(digests[0] != digests[1] && digests[1] != digests[2] && digests[0] != digests[2]);
+        assert_eq!(Recipe::builtin("nobody's"), None);
+    }
+
+    #[test]
+    fn the_digest_is_of_the_settings_and_not_of_the_text() {
+        let text = Recipe::builtin("tiny").unwrap();
+        let recipe = Recipe::parse(text).unwrap();
+        let renamed = text.replace("name = \"tiny\"", "# a comment\nname = \"other\"");
+        assert_eq!(Recipe::parse(&renamed).unwrap().digest(), recipe.digest());
+        let changed = text.replace("spelling = false", "spelling = true");
+        assert_ne!(changed, text);
+        assert_ne!(Recipe::parse(&changed).unwrap().digest(), recipe.digest());
+    }
+
+    #[test]
+    fn an_error_in_a_recipe_says_where_and_what_was_expected() {
+        let text = Recipe::builtin("tiny").unwrap();
+        let check = |from: &str, to: &str, expected: &str| {
+            assert!(text.contains(from), "{from}");
+            let broken = text.replacen(from, to, 1);
+            let error = Recipe::parse(&broken).unwrap_err();
+            let line = broken[..broken.find(to).unwrap()].matches('\n').count() + 1;
+            assert_eq!(error.line, line, "{error}");
+            assert!(error.to_string().contains(expected), "{error}");
+        };
+        check("spelling = false", "speling = false", "expected one of `adjectives`");
+        check("spelling = false", "spelling = 3", "expected a boolean");
+        check("split = \"and\"", "split = \"often\"", "expected `and` or `clauses`");
+        check("name = \"tiny\"", "name = \"ti ny\"", "expected 1 to 64 letters");
+        check("table = \"paper\"", "table = \"none\"", "there is no word table \"none\"");
+        check("kind = \"exemplar\"", "kind = \"oracle\"", "expected `exemplar`");
+        check("hidden = 8\n", "hidden = 0\n", "a number between 1 and 512");
+        check("hidden = 16\n", "hidden = 0\n", "allowed is between 1 and 1024");
+        let error = Recipe::parse("name = ").unwrap_err();
+        assert_eq!((error.line, error.column), (1, 8));
+    }
 }

@@ -1,9 +1,9 @@
-use crate::language::{LiftedProgram, LiftedUtterance, Near};
+use crate::language::{Clause, LiftedProgram, Near};
 
 /// Pure. Parsers differ only behind this line.
 pub trait SemanticParser {
     /// Candidate programs for one clause, all within the parser's own threshold.
-    fn parse(&self, lifted: &LiftedUtterance) -> Parse;
+    fn parse(&self, clause: &Clause) -> Parse;
 }
 
 /// What a parser found.
@@ -16,9 +16,9 @@ pub struct Parse {
     pub nearest: Vec<Near>,
     /// What the distances were held against.
     pub threshold: f32,
-    /// Whether an exemplar has exactly this lifted form; it then comes first and beats the
-    /// reranker.
-    pub exact: bool,
+    /// How many of the candidates come from exemplars with exactly this lifted form. They come
+    /// first and beat the reranker.
+    pub exact: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]

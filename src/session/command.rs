@@ -72,3 +72,20 @@ pub enum Query {
     /// Phase, goal, progress, actions so far and what may be taught.
     Status,
 }
+
+impl Command {
+    /// The verb as people type it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Command::Open { .. } => "open",
+            Command::StartEpisode { .. } => "start an episode",
+            Command::Say { .. } => "say",
+            Command::Done => "done",
+            Command::Teach { .. } => "teach",
+            Command::FinishTeaching => "finish teaching",
+            Command::Forget { .. } => "forget",
+            Command::Close { .. } => "close",
+            Command::FinishRetrain { .. } => "finish retraining",
+        }
+    }
+}

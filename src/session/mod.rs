@@ -1,10 +1,188 @@
 //! One user, as a state machine: the decider says which events a command deserves, `apply` says
 //! what an event does to the state. Pure: no clock, no entropy, no file, no socket.
 
+mod apply;
 mod command;
+mod decide;
 mod rejection;
 mod reply;
+mod snapshot;
+mod state;
+mod views;
 
+use std::sync::Arc;
+
+pub use apply::Divergence;
 pub use command::{Command, OnClash, Query};
 pub use rejection::{Rejection, RejectionCode};
-pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told};
+pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told, reply_of};
+pub use state::{LiveLesson, State};
+
+use crate::events::{Batch, Durable, Head, Record};
+use crate::ids::{Digest, RequestId, Seq, Timestamp};
+use crate::learning::{Lesson, Mind, Recipe};
+use crate::world::Domain;
+
+/// One person's session: a state that only records change, and the mind that answers.
+///
+/// Live operation, recovery, audit and simulation all drive this same type:
+/// `propose` → (the log makes it durable) → `settle`; or `apply` record by record.
+#[derive(Debug, Clone)]
+pub struct Session<D: Domain> {
+    domain: Arc<D>,
+    state: State<D::Scene, D::Task>,
+    recipe: Option<Arc<Recipe>>,
+    mind: Option<Arc<Mind>>,
+}
+
+/// What a command leads to, if the log agrees.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Proposed {
+    Turn(Turn),
+    /// This request was answered before, by these records; nothing is to be appended.
+    Repeat {
+        first: Seq,
+        last: Seq,
+    },
+}
+
+/// Proposed events: not yet true. Becomes a reply through [`Session::settle`] alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Turn {
+    /// Where the stream must still end when the batch is appended.
+    pub after: Head,
+    pub batch: Batch,
+}
+
+/// Work that the state says is due.
+#[derive(Debug, Clone)]
+pub enum Outstanding<D: Domain> {
+    /// Train on these lessons and come back with `Command::FinishRetrain`.
+    Retrain { recipe: Arc<Recipe>, lessons: Vec<Lesson<D::Scene, D::Task>> },
+}
+
+impl<D: Domain> Session<D> {
+    /// A session before its first record.
+    pub fn new(domain: Arc<D>) -> Session<D> {
+        Session { domain, state: State::default(), recipe: None, mind: None }
+    }
+
+    /// Decides what `command` deserves. Nothing changes.
+    ///
+    /// - `request`: a repeated id gets [`Proposed::Repeat`] (invariant `ExactlyOnce`).
+    /// - `at`: see [`Session::next_at`].
+    /// - errors: a [`Rejection`], which is not remembered.
+    /// - panics: when the mind that the state names was not [installed](Session::install).
+    pub fn propose(
+        &self,
+        command: &Command,
+        request: RequestId,
+        at: Timestamp,
+    ) -> Result<Proposed, Rejection> {
+        if let Some(answered) = self.state.requests.find(request) {
+            return Ok(Proposed::Repeat { first: answered.first, last: answered.last });
+        }
+        let events = decide::decide(self, command)?;
+        let batch = Batch { request, at, events };
+        Ok(Proposed::Turn(Turn { after: self.head(), batch }))
+    }
+
+    /// Makes a durable turn true and says what its person is told.
+    ///
+    /// - errors: [`Divergence`] when the receipt is for other records than the state expects; the
+    ///   session must then be dropped and rebuilt.
+    pub fn settle(&mut self, durable: &Durable) -> Result<Reply, Divergence> {
+        for record in durable.records() {
+            self.apply(record)?;
+        }
+        Ok(reply_of(durable.records()))
+    }
+
+    /// Applies one record of the past.
+    ///
+    /// - errors: [`Divergence`]; the session must then be dropped.
+    pub fn apply(&mut self, record: &Record) -> Result<(), Divergence> {
+        apply::apply(&*self.domain, &mut self.state, record)?;
+        if self.recipe.is_none() {
+            self.recipe = parse_recipe(&self.state);
+        }
+        Ok(())
+    }
+
+    /// Gives the session the mind that its state names.
+    ///
+    /// - panics: when `mind` is another one (invariant `ModelAgrees`).
+    pub fn install(&mut self, mind: Arc<Mind>) {
+        assert_eq!(Some(mind.digest()), self.state.mind, "ModelAgrees: the state names its mind");
+        self.mind = Some(mind);
+    }
+
+    /// The mind that must be installed before the next command, if it is not yet.
+    pub fn mind_wanted(&self) -> Option<Digest> {
+        let installed = self.mind.as_ref().map(|mind| mind.digest());
+        self.state.mind.filter(|wanted| installed != Some(*wanted))
+    }
+
+    /// The mind that answers now.
+    pub fn mind(&self) -> Option<&Arc<Mind>> {
+        self.mind.as_ref()
+    }
+
+    /// Work that is due: re-asked after every settle and every activation, so that a scheduled
+    /// training is never forgotten (invariant `NoLostWork`).
+    pub fn outstanding(&self) -> Option<Outstanding<D>> {
+        let training = self.state.training.as_ref()?;
+        let recipe = self.recipe.clone()?;
+        Some(Outstanding::Retrain { recipe, lessons: self.lessons_of(&training.lessons) })
+    }
+
+    /// The lessons that the present mind was trained on, for whoever must train it again.
+    pub fn trained_lessons(&self) -> Vec<Lesson<D::Scene, D::Task>> {
+        self.lessons_of(&self.state.trained)
+    }
+
+    fn lessons_of(&self, seqs: &[Seq]) -> Vec<Lesson<D::Scene, D::Task>> {
+        let kept = || self.state.lessons.iter().chain(&self.state.retired);
+        let find = |seq: &Seq| kept().find(|live| live.seq == *seq).map(|live| live.lesson.clone());
+        seqs.iter().filter_map(find).collect()
+    }
+
+    pub fn domain(&self) -> &Arc<D> {
+        &self.domain
+    }
+
+    pub fn state(&self) -> &State<D::Scene, D::Task> {
+        &self.state
+    }
+
+    pub fn head(&self) -> Head {
+        self.state.head.into()
+    }
+
+    pub fn phase(&self) -> Phase {
+        self.state.phase
+    }
+
+    pub fn is_open(&self) -> bool {
+        self.state.opened.is_some()
+    }
+
+    /// The time of the next record: the wall clock, but never before the last record.
+    pub fn next_at(&self, wall: Timestamp) -> Timestamp {
+        Timestamp(wall.0.max(self.state.last_at.0 + 1))
+    }
+
+    /// - panics: before the session was opened.
+    pub fn recipe(&self) -> &Arc<Recipe> {
+        self.recipe.as_ref().expect("SessionOpened carries the recipe and is the first record")
+    }
+
+    fn mind_digest(&self) -> Digest {
+        self.state.mind.expect("SessionOpened names the base mind and is the first record")
+    }
+}
+
+fn parse_recipe<S, T>(state: &State<S, T>) -> Option<Arc<Recipe>> {
+    let opened = state.opened.as_ref()?;
+    Recipe::parse(&opened.recipe_text).ok().map(Arc::new)
+}

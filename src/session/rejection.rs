@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Phase;
 use crate::ids::Seq;
-use crate::language::{LiftedUtterance, Program, UtteranceError};
+use crate::language::{LiftedProgram, LiftedUtterance, UtteranceError};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
 };
@@ -38,10 +38,11 @@ pub enum Rejection {
     NotAfter { first: u32, before: u32, utterance: String },
     /// The same lifted form, or one that would swallow it, is taken by another program.
     #[error(
-        "\"{utterance}\" is already known as {known} ({}); replace it, keep both, or cancel",
-        whose(*lesson)
+        "\"{utterance}\" is already known as {known} ({}); {}",
+        whose(*lesson),
+        clash_way_out(*lesson)
     )]
-    Clash { utterance: LiftedUtterance, known: Program, lesson: Option<Seq> },
+    Clash { utterance: LiftedUtterance, known: LiftedProgram, lesson: Option<Seq> },
     #[error("there is no live lesson at record {lesson}")]
     NoSuchLesson { lesson: Seq },
     #[error("{LESSONS_MAX} lessons are kept at most; forget one first")]
@@ -88,6 +89,8 @@ impl Rejection {
             | Rejection::NotContiguous { .. }
             | Rejection::NoSuchAction { .. }
             | Rejection::NotAfter { .. } => RejectionCode::BadTeach,
+            // The code says that there is a choice; against a seed there is none.
+            Rejection::Clash { lesson: None, .. } => RejectionCode::BadTeach,
             Rejection::Clash { .. } => RejectionCode::Clash,
             Rejection::NoSuchLesson { .. } => RejectionCode::NoSuchLesson,
             Rejection::TooManyLessons | Rejection::EpisodeFull => RejectionCode::LimitReached,
@@ -120,5 +123,12 @@ fn whose(lesson: Option<Seq>) -> String {
     match lesson {
         Some(seq) => format!("your lesson at record {seq}"),
         None => "one of the seeds".to_owned(),
+    }
+}
+
+fn clash_way_out(lesson: Option<Seq>) -> &'static str {
+    match lesson {
+        Some(_) => "replace it, keep both, or cancel",
+        None => "a seed stays: say it in other words",
     }
 }

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::events::{Ending, Report};
+use crate::events::{Ending, Event, Record, Report};
 use crate::ids::{Digest, Seq};
 use crate::language::{Answer, Exemplar, Program};
 
@@ -69,6 +69,53 @@ pub enum Told {
     },
 }
 
+/// The reply to the command that these records came from. `records` is not empty: every accepted
+/// command records something.
+pub fn reply_of(records: &[Record]) -> Reply {
+    let first = records.first().expect("an accepted command records at least one event").seq;
+    let last = records.last().expect("an accepted command records at least one event").seq;
+    Reply { first, last, told: records.iter().map(told).collect() }
+}
+
+fn told(record: &Record) -> Told {
+    match record.event.clone() {
+        Event::SessionOpened(event) => Told::Opened { recipe: event.recipe, mind: event.mind },
+        Event::EpisodeStarted(event) => {
+            Told::EpisodeStarted { goal: event.goal, fewest: event.fewest }
+        }
+        Event::Interpreted(event) => Told::Answered {
+            seq: record.seq,
+            utterance: event.utterance.into(),
+            answer: event.answer,
+            actions_before: event.actions_before,
+        },
+        Event::EpisodeEnded(event) => Told::EpisodeEnded {
+            ending: event.ending,
+            utterances: event.utterances,
+            actions: event.actions,
+            to_teach: event.to_teach,
+        },
+        Event::DecompositionTaught(event) => Told::Taught {
+            lesson: record.seq,
+            explains: event.explains,
+            utterance: event.utterance.into(),
+            program: event.program,
+            first: event.first,
+            last: event.last,
+        },
+        Event::DecompositionDeclined(event) => {
+            Told::Declined { explains: event.explains, utterance: event.utterance.into() }
+        }
+        Event::LessonForgotten(event) => {
+            Told::Forgotten { lesson: event.lesson, utterance: event.utterance.into() }
+        }
+        Event::RetrainScheduled(event) => Told::Learning { lessons: event.lessons.len() as u32 },
+        Event::RetrainCompleted(event) => Told::Learned { mind: event.mind, report: event.report },
+        Event::RetrainFailed(event) => Told::LearningFailed { reason: event.reason },
+        Event::SessionClosed(event) => Told::Closed { reason: event.reason },
+    }
+}
+
 /// Where a person is in the round of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -125,6 +172,8 @@ pub struct Teachable {
     pub utterance: String,
     /// Only actions after this number can explain it.
     pub actions_before: u32,
+    /// Whether the answer was NOT-SURE; otherwise it was understood but impossible.
+    pub not_sure: bool,
 }
 
 /// One exemplar of the present mind, for [`super::Query::Known`].

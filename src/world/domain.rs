@@ -120,6 +120,9 @@ pub enum StageError {
 #[error("{reason}")]
 pub struct Infeasible {
     pub reason: String,
+    /// The step that would have to come first, where one step is what is missing: going to what is
+    /// out of reach, opening what is shut. Recipes may take it unasked.
+    pub first: Option<Step>,
 }
 
 /// What a person sees of a scene.

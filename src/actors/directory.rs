@@ -1,0 +1,223 @@
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use actix::dev::SendError;
+use actix::{Actor, Context, Handler, Message, Recipient};
+
+use super::awake::{Awake, AwakeCount};
+use super::response::{Ask, ErrorCode, Hello, Response};
+use super::submit::{Presence, Submit};
+use crate::ids::{StreamId, TenantId, UserId};
+use crate::limits::DIRECTORY_QUEUE_MAX;
+
+/// Knows who is awake, wakes whoever is asked for, and is the only one who puts people to sleep:
+/// an actor that stopped by itself while others hold its address would lose their messages.
+pub(super) struct Directory {
+    pub people: Box<dyn People>,
+    /// People awake at once; then the longest idle one goes to sleep.
+    pub awake_max: usize,
+    pub hello: Hello,
+    pub count: Arc<AwakeCount>,
+    entries: HashMap<StreamId, Entry>,
+    /// From the tick of the last request to whose it was: the longest idle first.
+    order: BTreeMap<u64, StreamId>,
+    ticks: u64,
+}
+
+/// Where people's actors come from; hides the domain from the directory and from the front ends.
+pub(super) trait People: Send + Unpin + 'static {
+    /// - errors: a sentence, when the tenant's key cannot be read or made.
+    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String>;
+    fn wake(&self, waking: Waking) -> Address;
+}
+
+/// What a new actor is given.
+pub(super) struct Waking {
+    pub stream: StreamId,
+    pub user: UserId,
+    /// Told apart from earlier actors of the same person.
+    pub generation: u64,
+    pub presence: Presence,
+    pub _awake: Awake,
+    pub leaving: Recipient<Leaving>,
+}
+
+/// The address of one person's actor.
+pub(super) struct Address {
+    pub submit: Recipient<Submit>,
+    pub sleep: Recipient<Sleep>,
+}
+
+/// Sent to a person's actor after it was struck off the directory; its last message.
+#[derive(Debug, Message)]
+#[rtype(result = "()")]
+pub(super) struct Sleep;
+
+/// An actor asks to be struck off, because it cannot go on; the next request starts a new one.
+#[derive(Debug, Message)]
+#[rtype(result = "()")]
+pub(super) struct Leaving {
+    pub stream: StreamId,
+    pub generation: u64,
+}
+
+/// Everybody is to go to sleep, and nobody to be woken any more.
+#[derive(Debug, Message)]
+#[rtype(result = "()")]
+pub(super) struct SleepAll;
+
+struct Entry {
+    address: Address,
+    presence: Presence,
+    generation: u64,
+    tick: u64,
+}
+
+/// Milliseconds after which a request that met a full queue may be sent again.
+const RETRY_FULL_MS: u32 = 100;
+/// Milliseconds after which a request may be sent again that found everybody busy.
+const RETRY_CROWD_MS: u32 = 1_000;
+/// How many of the longest idle are asked whether they may sleep before a request is refused.
+const SLEEPERS_TRIED_MAX: usize = 64;
+
+impl Directory {
+    pub fn new(
+        people: Box<dyn People>,
+        awake_max: usize,
+        hello: Hello,
+        count: Arc<AwakeCount>,
+    ) -> Directory {
+        Directory {
+            people,
+            awake_max,
+            hello,
+            count,
+            entries: HashMap::new(),
+            order: BTreeMap::new(),
+            ticks: 0,
+        }
+    }
+
+    fn forward(&mut self, stream: StreamId, mut submit: Submit, ctx: &mut Context<Self>) {
+        // Twice at most: an address that turns out to be closed is replaced by a fresh one.
+        for _ in 0..2 {
+            if !self.entries.contains_key(&stream) && !self.wake(&stream, &submit.user, ctx) {
+                let crowd = "everybody who is awake is busy and no one else can be woken";
+                submit.answer.send(Response::busy(crowd, RETRY_CROWD_MS));
+                return;
+            }
+            self.touch(&stream);
+            let entry = self.entries.get(&stream).expect("it was there or was just made");
+            submit.answer.hold(entry.presence.attend());
+            match entry.address.submit.try_send(submit) {
+                Ok(()) => return,
+                Err(SendError::Full(submit)) => {
+                    let full = "you have too many requests waiting; send it again in a moment";
+                    submit.answer.send(Response::busy(full, RETRY_FULL_MS));
+                    return;
+                }
+                // The actor died, of a panic: what it was is in the log.
+                Err(SendError::Closed(back)) => {
+                    tracing::warn!(%stream, "an actor died; a new one is started from the log");
+                    self.strike_off(&stream);
+                    submit = back;
+                }
+            }
+        }
+    }
+
+    fn wake(&mut self, stream: &StreamId, user: &UserId, ctx: &mut Context<Self>) -> bool {
+        use actix::AsyncContext;
+        if self.entries.len() >= self.awake_max && !self.put_one_to_sleep() {
+            return false;
+        }
+        self.ticks += 1;
+        let (presence, generation) = (Presence::default(), self.ticks);
+        let address = self.people.wake(Waking {
+            stream: stream.clone(),
+            user: user.clone(),
+            generation,
+            presence: presence.clone(),
+            _awake: self.count.enter(),
+            leaving: ctx.address().recipient(),
+        });
+        let entry = Entry { address, presence, generation, tick: self.ticks };
+        self.order.insert(self.ticks, stream.clone());
+        self.entries.insert(stream.clone(), entry);
+        true
+    }
+
+    /// - returns: whether one of the longest idle had nothing to do and was told to sleep.
+    fn put_one_to_sleep(&mut self) -> bool {
+        let idle =
+            self.order.values().take(SLEEPERS_TRIED_MAX).find(|stream| {
+                self.entries.get(*stream).is_some_and(|entry| entry.presence.is_idle())
+            });
+        let Some(stream) = idle.cloned() else { return false };
+        self.strike_off(&stream);
+        tracing::debug!(%stream, "sleeps");
+        true
+    }
+
+    /// Removes the entry first and then tells the actor to stop, so that no message can follow.
+    fn strike_off(&mut self, stream: &StreamId) {
+        if let Some(entry) = self.entries.remove(stream) {
+            self.order.remove(&entry.tick);
+            entry.address.sleep.do_send(Sleep);
+        }
+    }
+
+    fn touch(&mut self, stream: &StreamId) {
+        self.ticks += 1;
+        let entry = self.entries.get_mut(stream).expect("the caller looked");
+        self.order.remove(&entry.tick);
+        entry.tick = self.ticks;
+        self.order.insert(self.ticks, stream.clone());
+    }
+}
+
+impl Actor for Directory {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        ctx.set_mailbox_capacity(DIRECTORY_QUEUE_MAX);
+    }
+}
+
+impl Handler<Submit> for Directory {
+    type Result = ();
+
+    fn handle(&mut self, submit: Submit, ctx: &mut Context<Self>) {
+        if submit.ask == Ask::Hello {
+            submit.answer.send(Response::Hello(self.hello.clone()));
+            return;
+        }
+        match self.people.stream_of(&submit.tenant, &submit.user) {
+            Ok(stream) => self.forward(stream, submit, ctx),
+            Err(reason) => submit.answer.send(Response::error(ErrorCode::Unavailable, reason)),
+        }
+    }
+}
+
+impl Handler<Leaving> for Directory {
+    type Result = ();
+
+    fn handle(&mut self, leaving: Leaving, _: &mut Context<Self>) {
+        let Leaving { stream, generation } = leaving;
+        if self.entries.get(&stream).is_some_and(|entry| entry.generation == generation) {
+            self.strike_off(&stream);
+        }
+    }
+}
+
+impl Handler<SleepAll> for Directory {
+    type Result = ();
+
+    fn handle(&mut self, _: SleepAll, _: &mut Context<Self>) {
+        let streams: Vec<StreamId> = self.entries.keys().cloned().collect();
+        self.awake_max = 0;
+        for stream in streams {
+            self.strike_off(&stream);
+        }
+    }
+}

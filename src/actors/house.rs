@@ -1,0 +1,184 @@
+use std::sync::{Arc, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use actix::dev::SendError;
+use actix::{Actor, Addr, Arbiter, ArbiterHandle, Recipient, SyncArbiter, System};
+
+use super::awake::AwakeCount;
+use super::directory::{Address, Directory, People, SleepAll, Waking};
+use super::life::{Life, Parts};
+use super::trainer::Trainer;
+use super::user::UserActor;
+use super::{Failure, Hello, Submit};
+use crate::ids::{StreamId, TenantId, UserId};
+use crate::learning::Recipe;
+use crate::store::Store;
+use crate::world::Domain;
+
+/// Everybody who is awake, on an actix system with a thread of its own.
+pub struct House {
+    directory: Addr<Directory>,
+    system: System,
+    thread: Option<JoinHandle<()>>,
+    failure: Failure,
+    awake: Arc<AwakeCount>,
+    lives: Arc<AwakeCount>,
+}
+
+/// What the actors are started with.
+pub struct HouseSettings<D: Domain> {
+    pub domain: Arc<D>,
+    pub store: Store,
+    /// What new people start with.
+    pub recipe_text: String,
+    /// Trainings at once.
+    pub trainers: usize,
+    /// Threads that people's actors share.
+    pub arbiters: usize,
+    /// People awake at once.
+    pub awake_max: usize,
+    pub failure: Failure,
+}
+
+/// Why the actors did not start.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ActorsError {
+    #[error("the recipe for new people cannot be read: {reason}")]
+    Recipe { reason: String },
+    #[error("the base mind cannot be trained: {reason}")]
+    BaseMind { reason: String },
+    #[error("the actors did not start: {reason}")]
+    System { reason: String },
+}
+
+/// Where front ends hand in requests. Knows no domain.
+#[derive(Clone)]
+pub struct Front(Recipient<Submit>);
+
+/// A request that was not taken, given back.
+pub enum NotTaken {
+    /// Too many are waiting.
+    Full(Submit),
+    /// Nobody is there any more.
+    Closed(Submit),
+}
+
+impl Front {
+    pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
+        self.0.try_send(submit).map_err(|error| match error {
+            SendError::Full(submit) => NotTaken::Full(submit),
+            SendError::Closed(submit) => NotTaken::Closed(submit),
+        })
+    }
+}
+
+/// How long a stop waits for actors to fall asleep, and then for trainings to end.
+const FALL_ASLEEP: Duration = Duration::from_secs(30);
+
+impl House {
+    /// Trains the base mind, so that nobody ever waits for it, and starts the actors.
+    pub fn start<D: Domain>(settings: HouseSettings<D>) -> Result<House, ActorsError> {
+        let HouseSettings { domain, store, recipe_text, trainers, arbiters, awake_max, failure } =
+            settings;
+        let recipe = Recipe::parse(&recipe_text)
+            .map_err(|error| ActorsError::Recipe { reason: error.to_string() })?;
+        let hello = Hello {
+            service: env!("CARGO_PKG_NAME").to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            domain: domain.id().to_owned(),
+            recipe: recipe.name().to_owned(),
+        };
+        let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
+        let parts = Parts {
+            domain,
+            store,
+            recipe,
+            recipe_text,
+            failure: failure.clone(),
+            open: lives.enter(),
+        };
+        let parts = parts.with_base_mind().map_err(|reason| ActorsError::BaseMind { reason })?;
+
+        let (started, ready) = mpsc::channel();
+        let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
+        let thread = thread::Builder::new()
+            .name("actors".to_owned())
+            .spawn(move || {
+                let _alarm = alarm;
+                let system = System::new();
+                let directory = system.block_on(async move {
+                    let life = Life::start(parts, |life| {
+                        SyncArbiter::start(trainers.max(1), move || Trainer { life: life.clone() })
+                    });
+                    let arbiters: Vec<Arbiter> =
+                        (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
+                    let homes = arbiters.iter().map(Arbiter::handle).collect();
+                    let people = Box::new(Homes { life, homes });
+                    Directory::new(people, awake_max, hello, count).start()
+                });
+                let _ = started.send((directory, System::current()));
+                if let Err(error) = system.run() {
+                    tracing::error!(%error, "the actors' system ended with an error");
+                }
+            })
+            .map_err(|error| ActorsError::System { reason: error.to_string() })?;
+        let (directory, system) = ready
+            .recv()
+            .map_err(|_| ActorsError::System { reason: "their thread ended at once".to_owned() })?;
+        Ok(House { directory, system, thread: Some(thread), failure, awake, lives })
+    }
+
+    pub fn front(&self) -> Front {
+        Front(self.directory.clone().recipient())
+    }
+
+    /// People awake now.
+    pub fn awake(&self) -> usize {
+        self.awake.now()
+    }
+
+    /// Sends everybody to sleep, which keeps their snapshots, and closes the store.
+    pub fn stop(&mut self) {
+        let Some(thread) = self.thread.take() else { return };
+        self.failure.stop_expected();
+        self.directory.do_send(SleepAll);
+        if !self.awake.wait_for_silence(FALL_ASLEEP) {
+            tracing::warn!(awake = self.awake.now(), "stopping although not everybody sleeps");
+        }
+        self.system.stop();
+        // A panic in there was reported by its alarm.
+        let _ = thread.join();
+        // A training that still runs holds the store; whoever opens it next must not find it busy.
+        if !self.lives.wait_for_silence(FALL_ASLEEP) {
+            tracing::warn!("the store is still held by a training");
+        }
+    }
+}
+
+impl Drop for House {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Starts people's actors, spread over arbiters.
+struct Homes<D: Domain> {
+    life: Arc<Life<D>>,
+    homes: Vec<ArbiterHandle>,
+}
+
+impl<D: Domain> People for Homes<D> {
+    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String> {
+        self.life.stream_of(tenant, user)
+    }
+
+    fn wake(&self, waking: Waking) -> Address {
+        // The key is a keyed hash: its bytes are spread evenly.
+        let place = usize::from(waking.stream.key.0[0]) % self.homes.len();
+        let life = self.life.clone();
+        let user =
+            UserActor::start_in_arbiter(&self.homes[place], move |_| UserActor::new(life, waking));
+        Address { submit: user.clone().recipient(), sleep: user.recipient() }
+    }
+}

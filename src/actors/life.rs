@@ -1,0 +1,235 @@
+//! What actors share, and what they do outside the mailbox: waking, training, remembering.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, OnceLock};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use actix::Addr;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::awake::Awake;
+use super::trainer::Trainer;
+use super::{ErrorCode, Failure, Response};
+use crate::events::Record;
+use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
+use crate::learning::{self, Lesson, Mind, Recipe};
+use crate::limits::TRAIN_QUEUE_MAX;
+use crate::replay::{self, Minds};
+use crate::session::{Command, Proposed, Session};
+use crate::store::{AppendError, EventLog, Store};
+use crate::world::Domain;
+
+/// What the actors are made from, before there is an actix system.
+pub(super) struct Parts<D: Domain> {
+    pub domain: Arc<D>,
+    pub store: Store,
+    pub recipe: Recipe,
+    pub recipe_text: String,
+    pub failure: Failure,
+    pub open: Awake,
+}
+
+impl<D: Domain> Parts<D> {
+    /// Trains the mind that new people start with. It holds nobody's words, so everybody shares it.
+    pub fn with_base_mind(self) -> Result<Seeded<D>, String> {
+        let train = || learning::train(&*self.domain, &self.recipe, &[]);
+        let base = catch_unwind(AssertUnwindSafe(train))
+            .map_err(|panic| panic_words(&*panic))?
+            .map_err(|error| error.to_string())?;
+        Ok(Seeded { parts: self, base: Arc::new(base) })
+    }
+}
+
+/// [`Parts`] and the base mind.
+pub(super) struct Seeded<D: Domain> {
+    parts: Parts<D>,
+    base: Arc<Mind>,
+}
+
+/// What the actors share. Lives as long as anyone uses the store.
+pub(super) struct Life<D: Domain> {
+    domain: Arc<D>,
+    store: Store,
+    recipe_text: String,
+    base: Arc<Mind>,
+    minds: Arc<Minds>,
+    trainer: OnceLock<Addr<Trainer<D>>>,
+    places: Arc<Semaphore>,
+    failure: Failure,
+    // Last, so that it ends after the store was closed: fields are dropped in this order.
+    _open: Awake,
+}
+
+impl<D: Domain> Life<D> {
+    /// Must run on the actix system's thread, where `trainer` starts its threads.
+    pub fn start(
+        seeded: Seeded<D>,
+        trainer: impl FnOnce(Arc<Life<D>>) -> Addr<Trainer<D>>,
+    ) -> Arc<Life<D>> {
+        let Seeded { parts, base } = seeded;
+        let Parts { domain, store, recipe: _, recipe_text, failure, open } = parts;
+        let life = Arc::new(Life {
+            domain,
+            store,
+            recipe_text,
+            base,
+            minds: Arc::default(),
+            trainer: OnceLock::new(),
+            places: Arc::new(Semaphore::new(TRAIN_QUEUE_MAX)),
+            failure,
+            _open: open,
+        });
+        let address = trainer(life.clone());
+        life.trainer.set(address).ok().expect("it was just made and is set once");
+        life
+    }
+}
+
+impl<D: Domain> Life<D> {
+    pub fn log(&self) -> &dyn EventLog {
+        &*self.store.log
+    }
+
+    pub fn trainer(&self) -> &Addr<Trainer<D>> {
+        self.trainer.get().expect("set before the first actor starts")
+    }
+
+    pub fn failure(&self) -> &Failure {
+        &self.failure
+    }
+
+    pub fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String> {
+        self.store.keys.stream_id(tenant, user).map_err(|error| error.to_string())
+    }
+
+    /// The wall clock; a session makes it monotone with `next_at`.
+    pub fn now(&self) -> Timestamp {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Timestamp(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
+    }
+
+    /// A place in the trainers' queue, while there is one.
+    pub fn place_in_queue(&self) -> Option<OwnedSemaphorePermit> {
+        self.places.clone().try_acquire_owned().ok()
+    }
+
+    pub fn mind(&self, tenant: &TenantId, digest: Digest) -> Option<Arc<Mind>> {
+        self.minds.get(tenant, digest)
+    }
+
+    pub fn remember(&self, tenant: &TenantId, mind: Arc<Mind>) {
+        self.minds.put(tenant, mind);
+    }
+
+    /// The records `first` to `last` of a stream, for answering a request again.
+    ///
+    /// - errors: a sentence, when they cannot be read.
+    pub fn records(&self, stream: &StreamId, first: Seq, last: Seq) -> Result<Vec<Record>, String> {
+        let wanted = (last.get() - first.get() + 1) as usize;
+        let records = self.log().read(stream, first).map_err(|error| error.to_string())?;
+        let records: Vec<Record> =
+            records.take(wanted).collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+        match records.len() == wanted {
+            true => Ok(records),
+            false => Err(format!("records {first} to {last} of {stream} are missing")),
+        }
+    }
+}
+
+/// Rebuilds a session from the log; for somebody new, opens the stream first. Blocks.
+///
+/// - errors: what to answer to whoever asks for this person.
+pub(super) fn wake<D: Domain>(
+    life: &Life<D>,
+    stream: &StreamId,
+    user: &UserId,
+) -> Result<Session<D>, Response> {
+    let unavailable = |reason: String| {
+        Response::error(ErrorCode::Unavailable, format!("this session cannot be woken: {reason}"))
+    };
+    // Never pushed out of the memory of minds for long: everybody begins with it.
+    life.remember(&stream.tenant, life.base.clone());
+    let mut session = replay::rebuild(&life.domain, &life.store, stream, &life.minds)
+        .map_err(|error| unavailable(error.to_string()))?;
+    if session.is_open() {
+        return Ok(session);
+    }
+    let command = Command::Open {
+        user: user.clone(),
+        recipe_text: life.recipe_text.clone(),
+        mind: life.base.digest(),
+    };
+    let proposed = session.propose(&command, fresh_request(), session.next_at(life.now()));
+    let turn = match proposed {
+        Ok(Proposed::Turn(turn)) => turn,
+        Ok(Proposed::Repeat { .. }) => unreachable!("a fresh request id was not answered before"),
+        Err(rejection) => return Err(unavailable(rejection.to_string())),
+    };
+    let durable = match life.log().append(stream, turn.after, turn.batch).wait() {
+        Ok(durable) => durable,
+        Err(error @ (AppendError::Busy { .. } | AppendError::Conflict { .. })) => {
+            return Err(Response::busy(error.to_string(), RETRY_WAKE_MS));
+        }
+        Err(error) => {
+            if matches!(error, AppendError::Poisoned { .. } | AppendError::Gone) {
+                life.failure.report(error.to_string());
+            }
+            return Err(unavailable(error.to_string()));
+        }
+    };
+    session.settle(&durable).map_err(|divergence| unavailable(divergence.to_string()))?;
+    session.install(life.base.clone());
+    tracing::info!(%stream, "somebody new");
+    Ok(session)
+}
+
+/// Milliseconds after which a new person's first request may be sent again.
+const RETRY_WAKE_MS: u32 = 100;
+
+/// Trains a mind and keeps its bytes, before any record names them. Runs on a trainer's thread.
+///
+/// - errors: the reason, in the trainer's words.
+pub(super) fn train<D: Domain>(
+    life: &Life<D>,
+    stream: &StreamId,
+    recipe: &Recipe,
+    lessons: &[Lesson<D::Scene, D::Task>],
+) -> Result<Arc<Mind>, String> {
+    let mind =
+        learning::train(&*life.domain, recipe, lessons).map_err(|error| error.to_string())?;
+    if let Err(error) = life.store.models.put(stream, mind.digest(), &mind.to_bytes()) {
+        // The bytes of a mind are a cache: without them the next waking trains again.
+        tracing::warn!(%stream, %error, "the mind's bytes were not kept");
+    }
+    Ok(Arc::new(mind))
+}
+
+/// Keeps a snapshot, so that the next waking folds less. A cache: failing costs time only.
+pub(super) fn keep_snapshot<D: Domain>(life: &Life<D>, stream: &StreamId, session: &Session<D>) {
+    if let Err(reason) = replay::keep_snapshot(&life.store, stream, session) {
+        tracing::warn!(%stream, %reason, "no snapshot was kept");
+    }
+}
+
+/// Forgets the bytes of minds that nobody will ask for again.
+pub(super) fn forget_old_minds<D: Domain>(life: &Life<D>, stream: &StreamId, session: &Session<D>) {
+    let current: Vec<Digest> = session.mind().iter().map(|mind| mind.digest()).collect();
+    if let Err(reason) = life.store.models.keep_only(stream, &current) {
+        tracing::warn!(%stream, %reason, "old minds were not dropped");
+    }
+}
+
+/// A request id for what the service itself asks for.
+pub(super) fn fresh_request() -> RequestId {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).expect("the operating system gives random bytes");
+    RequestId(bytes)
+}
+
+/// What a panic said.
+pub(super) fn panic_words(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "a panic without words".to_owned())
+}

@@ -1,0 +1,113 @@
+use serde::{Deserialize, Serialize};
+
+use crate::session::{
+    Command, KnownExemplar, Query, Rejection, RejectionCode, Reply, Status, Told,
+};
+use crate::world::View;
+
+/// What a person may ask of the service.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ask {
+    Command(Command),
+    Query(Query),
+    /// Answered as soon as the phase is not Learning, or after this many seconds.
+    Wait {
+        seconds: u32,
+    },
+    /// Who is there. Wakes nobody.
+    Hello,
+}
+
+/// What the service answers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Response {
+    /// The command was recorded; this is what came of it.
+    Reply(Reply),
+    Status(Status),
+    Look(View),
+    Known(Vec<KnownExemplar>),
+    Waited(Waited),
+    Hello(Hello),
+    /// Declined; nothing was recorded.
+    Rejected(Rejected),
+    /// Not now. The same request id may be sent again.
+    Busy(Busy),
+    /// Cannot be answered; sending it again does not help.
+    Error(Failed),
+}
+
+/// The answer to [`Ask::Wait`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Waited {
+    pub status: Status,
+    /// How the last training ended: `learned` or `learning_failed`. Empty when none ended since
+    /// this person was last woken; the status then says what the present mind is.
+    pub told: Vec<Told>,
+}
+
+/// Who answers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// `apprentice`.
+    pub service: String,
+    /// The version of the binary.
+    pub version: String,
+    /// The name of the world, as in the records.
+    pub domain: String,
+    /// The recipe that new people start with.
+    pub recipe: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rejected {
+    pub code: RejectionCode,
+    pub message: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Busy {
+    pub message: String,
+    pub retry_after_ms: u32,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failed {
+    pub code: ErrorCode,
+    pub message: String,
+}
+
+/// What a program may branch on when a request could not be answered at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorCode {
+    /// The message is no request.
+    Malformed,
+    /// The message is larger than is read.
+    TooLarge,
+    /// The message is of another wire version.
+    UnsupportedVersion,
+    /// No such command or query.
+    UnknownVerb,
+    /// The command exists, but only inside the service.
+    InternalVerb,
+    /// This person's stream cannot be read or written now; an operator must look.
+    Unavailable,
+    /// We are wrong: a defect, with what is known about it.
+    Internal,
+}
+
+impl Response {
+    pub fn busy(message: impl Into<String>, retry_after_ms: u32) -> Response {
+        Response::Busy(Busy { message: message.into(), retry_after_ms })
+    }
+
+    pub fn error(code: ErrorCode, message: impl Into<String>) -> Response {
+        Response::Error(Failed { code, message: message.into() })
+    }
+}
+
+impl From<Rejection> for Response {
+    fn from(rejection: Rejection) -> Response {
+        Response::Rejected(Rejected { code: rejection.code(), message: rejection.to_string() })
+    }
+}

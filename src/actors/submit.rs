@@ -1,0 +1,125 @@
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use actix::Message;
+
+use super::{Ask, Response};
+use crate::ids::{RequestId, TenantId, UserId};
+
+/// One request on its way to the actor of its person.
+#[derive(Debug, Message)]
+#[rtype(result = "()")]
+pub struct Submit {
+    /// From the door the request came through, never from the request (invariant `TenantWall`).
+    pub tenant: TenantId,
+    pub user: UserId,
+    pub request: RequestId,
+    pub ask: Ask,
+    pub answer: AnswerTo,
+}
+
+/// The way back to whoever asked. Used exactly once: when it is dropped unused, because an actor
+/// stopped or a panic swept it away, the caller is told to ask again. Asking again with the same
+/// request id is always safe (invariant `ExactlyOnce`).
+pub struct AnswerTo {
+    way: Option<Box<dyn FnOnce(Response) + Send>>,
+    /// Keeps the person's actor from being put to sleep before the answer is out.
+    awake: Option<Attention>,
+}
+
+/// Milliseconds after which a request that was lost inside the service may be sent again: long
+/// enough for a new actor to start, short enough not to be felt.
+const RETRY_LOST_MS: u32 = 50;
+
+impl AnswerTo {
+    pub fn new(way: impl FnOnce(Response) + Send + 'static) -> AnswerTo {
+        AnswerTo { way: Some(Box::new(way)), awake: None }
+    }
+
+    pub fn send(mut self, response: Response) {
+        if let Some(way) = self.way.take() {
+            way(response);
+        }
+    }
+
+    pub(super) fn hold(&mut self, attention: Attention) {
+        self.awake = Some(attention);
+    }
+}
+
+impl Drop for AnswerTo {
+    fn drop(&mut self) {
+        if let Some(way) = self.way.take() {
+            way(Response::busy("the request was interrupted; send it again", RETRY_LOST_MS));
+        }
+    }
+}
+
+impl fmt::Debug for AnswerTo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("AnswerTo(..)")
+    }
+}
+
+/// How much one person's actor has to do: requests not yet answered and trainings not yet ended.
+/// Nobody with something to do is put to sleep.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Presence(Arc<AtomicUsize>);
+
+impl Presence {
+    pub fn attend(&self) -> Attention {
+        self.0.fetch_add(1, Ordering::SeqCst);
+        Attention(self.0.clone())
+    }
+
+    pub fn is_idle(&self) -> bool {
+        self.0.load(Ordering::SeqCst) == 0
+    }
+}
+
+/// One thing that a person's actor has to do. Ends when dropped.
+#[derive(Debug)]
+pub(super) struct Attention(Arc<AtomicUsize>);
+
+impl Drop for Attention {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[test]
+    fn a_dropped_request_is_answered_with_busy() {
+        let (sender, receiver) = mpsc::channel();
+        drop(AnswerTo::new(move |response| sender.send(response).unwrap()));
+        assert!(matches!(receiver.recv().unwrap(), Response::Busy(_)));
+        assert!(receiver.recv().is_err(), "one answer and no more");
+    }
+
+    #[test]
+    fn an_answered_request_is_answered_once() {
+        let (sender, receiver) = mpsc::channel();
+        AnswerTo::new(move |response| sender.send(response).unwrap())
+            .send(Response::Known(Vec::new()));
+        assert_eq!(receiver.recv().unwrap(), Response::Known(Vec::new()));
+        assert!(receiver.recv().is_err(), "one answer and no more");
+    }
+
+    #[test]
+    fn a_person_is_idle_when_every_answer_is_out() {
+        let presence = Presence::default();
+        let mut answer = AnswerTo::new(|_| {});
+        answer.hold(presence.attend());
+        let training = presence.attend();
+        answer.send(Response::Known(Vec::new()));
+        assert!(!presence.is_idle());
+        drop(training);
+        assert!(presence.is_idle());
+    }
+}

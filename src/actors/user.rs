@@ -1,0 +1,398 @@
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::fut::{LocalBoxActorFuture, ready};
+use actix::{
+    Actor, ActorContext, ActorFutureExt, AsyncContext, AtomicResponse, Context, Handler, WrapFuture,
+};
+
+use super::directory::{Leaving, Sleep, Waking};
+use super::life::{self, Life};
+use super::response::{Ask, ErrorCode, Rejected, Response, Waited};
+use super::submit::{AnswerTo, Submit};
+use super::trainer::{Train, Trained};
+use crate::events::{Durable, Report};
+use crate::ids::RequestId;
+use crate::learning;
+use crate::limits::{MAILBOX_MAX, WAIT_S_MAX, WAITERS_MAX};
+use crate::session::{
+    Command, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Told, Turn,
+    reply_of,
+};
+use crate::store::AppendError;
+use crate::world::Domain;
+
+/// One person, awake. Owns the session and is the only writer of its stream; while an append is
+/// in flight it handles nothing else, so it needs no lock.
+pub(super) struct UserActor<D: Domain> {
+    life: Arc<Life<D>>,
+    waking: Waking,
+    stage: Stage<D>,
+    /// A training is queued or runs.
+    training: bool,
+    /// How the last training ended.
+    last_told: Vec<Told>,
+    waiters: Vec<(u64, AnswerTo)>,
+    waiters_seen: u64,
+}
+
+enum Stage<D: Domain> {
+    /// The session is being rebuilt from the log; messages wait.
+    Waking,
+    Awake(Box<Session<D>>),
+    /// Cannot go on; whatever still arrives gets this answer, until the directory says sleep.
+    Leaving(Response),
+}
+
+/// A step of work that must be over before the next message is handled.
+type Atomic<D> = LocalBoxActorFuture<UserActor<D>, ()>;
+
+/// Seconds after which a training is asked for again when the trainers' queue was full.
+const TRAIN_AGAIN_S: u64 = 1;
+/// Milliseconds after which a request may be sent again that met another writer, or a full log.
+const RETRY_APPEND_MS: u32 = 100;
+
+impl<D: Domain> UserActor<D> {
+    pub fn new(life: Arc<Life<D>>, waking: Waking) -> UserActor<D> {
+        UserActor {
+            life,
+            waking,
+            stage: Stage::Waking,
+            training: false,
+            last_told: Vec::new(),
+            waiters: Vec::new(),
+            waiters_seen: 0,
+        }
+    }
+
+    fn done() -> Atomic<D> {
+        Box::pin(ready(()))
+    }
+
+    /// Stops in the only way that loses no message: the directory forgets this actor, and then
+    /// sends it to sleep. Until then everything is answered with `response`.
+    fn leave(&mut self, response: Response) {
+        self.waiters.clear();
+        self.stage = Stage::Leaving(response);
+        let (stream, generation) = (self.waking.stream.clone(), self.waking.generation);
+        self.waking.leaving.do_send(Leaving { stream, generation });
+    }
+
+    fn ask(
+        &mut self,
+        ask: Ask,
+        request: RequestId,
+        answer: AnswerTo,
+        ctx: &mut Context<Self>,
+    ) -> Atomic<D> {
+        let session = match &self.stage {
+            Stage::Awake(session) => session,
+            Stage::Leaving(response) => {
+                answer.send(response.clone());
+                return Self::done();
+            }
+            // `Context::wait` keeps messages away while the session is rebuilt.
+            Stage::Waking => return Self::done(),
+        };
+        match ask {
+            Ask::Command(command) => return self.perform(command, request, Some(answer)),
+            Ask::Query(query) => match view(session, query) {
+                Ok(response) => answer.send(response),
+                Err(panic) => {
+                    answer.send(panic.clone());
+                    self.leave(panic);
+                }
+            },
+            Ask::Wait { seconds } => self.wait(seconds, answer, ctx),
+            Ask::Hello => unreachable!("the directory answers hello"),
+        }
+        Self::done()
+    }
+
+    fn wait(&mut self, seconds: u32, answer: AnswerTo, ctx: &mut Context<Self>) {
+        let Stage::Awake(session) = &self.stage else { return };
+        if session.phase() != Phase::Learning {
+            let waited = Waited { status: session.status(), told: self.last_told.clone() };
+            answer.send(Response::Waited(waited));
+            return;
+        }
+        if self.waiters.len() >= WAITERS_MAX {
+            answer.send(Response::busy("too many are waiting for this training", 1_000));
+            return;
+        }
+        self.waiters_seen += 1;
+        let number = self.waiters_seen;
+        self.waiters.push((number, answer));
+        let limit = Duration::from_secs(u64::from(seconds.min(WAIT_S_MAX)));
+        ctx.run_later(limit, move |actor, _| {
+            let Some(place) = actor.waiters.iter().position(|(waiter, _)| *waiter == number) else {
+                return;
+            };
+            let (_, answer) = actor.waiters.remove(place);
+            if let Stage::Awake(session) = &actor.stage {
+                let waited = Waited { status: session.status(), told: Vec::new() };
+                answer.send(Response::Waited(waited));
+            }
+        });
+    }
+
+    /// Decide, append, and only then apply and answer. The future is the append.
+    fn perform(
+        &mut self,
+        command: Command,
+        request: RequestId,
+        answer: Option<AnswerTo>,
+    ) -> Atomic<D> {
+        let Stage::Awake(session) = &self.stage else { return Self::done() };
+        let at = session.next_at(self.life.now());
+        // Rust cannot know it, but `propose` only reads: a panic leaves the session as it was.
+        let proposed = catch_unwind(AssertUnwindSafe(|| session.propose(&command, request, at)));
+        let turn = match proposed {
+            Ok(Ok(Proposed::Turn(turn))) => turn,
+            Ok(Ok(Proposed::Repeat { first, last })) => {
+                let records = self.life.records(&self.waking.stream, first, last);
+                let response = match records {
+                    Ok(records) => Response::Reply(reply_of(&records)),
+                    Err(reason) => Response::error(ErrorCode::Unavailable, reason),
+                };
+                respond(answer, response);
+                return Self::done();
+            }
+            Ok(Err(rejection)) => {
+                respond(answer, rejection.into());
+                return Self::done();
+            }
+            Err(panic) => {
+                let response = defect("deciding", &*panic);
+                respond(answer, response.clone());
+                self.leave(response);
+                return Self::done();
+            }
+        };
+        let Turn { after, batch } = turn;
+        let pending = self.life.log().append(&self.waking.stream, after, batch);
+        Box::pin(pending.into_actor(self).map(move |result, actor, ctx| match result {
+            Ok(durable) => actor.settle(&command, &durable, answer, ctx),
+            Err(error) => actor.append_failed(error, answer),
+        }))
+    }
+
+    fn settle(
+        &mut self,
+        command: &Command,
+        durable: &Durable,
+        answer: Option<AnswerTo>,
+        ctx: &mut Context<Self>,
+    ) {
+        let Stage::Awake(session) = &mut self.stage else { return };
+        // A panic may leave the session half changed: it is then dropped, never used again.
+        let settled = catch_unwind(AssertUnwindSafe(|| session.settle(durable)));
+        let reply = match settled {
+            Ok(Ok(reply)) => reply,
+            Ok(Err(divergence)) => {
+                tracing::error!(stream = %self.waking.stream, %divergence, "binary and log disagree");
+                let response = Response::error(ErrorCode::Internal, divergence.to_string());
+                respond(answer, response.clone());
+                return self.leave(response);
+            }
+            Err(panic) => {
+                let response = defect("applying", &*panic);
+                respond(answer, response.clone());
+                return self.leave(response);
+            }
+        };
+        if let Command::FinishRetrain { .. } = command {
+            self.last_told = reply.told.clone();
+        }
+        if let Err(response) = self.equip() {
+            respond(answer, Response::Reply(reply));
+            return self.leave(response);
+        }
+        if let (Command::FinishRetrain { .. }, Stage::Awake(session)) = (command, &self.stage) {
+            life::forget_old_minds(&self.life, &self.waking.stream, session);
+        }
+        self.after(&reply, ctx);
+        respond(answer, Response::Reply(reply));
+    }
+
+    /// Gives the session the mind its state names, which a training or an activation made known.
+    fn equip(&mut self) -> Result<(), Response> {
+        let Stage::Awake(session) = &mut self.stage else { return Ok(()) };
+        let Some(wanted) = session.mind_wanted() else { return Ok(()) };
+        match self.life.mind(&self.waking.stream.tenant, wanted) {
+            Some(mind) => session.install(mind),
+            // Rare: the memory of minds is small. Rebuilding finds or trains it again.
+            None => return Err(Response::busy("the mind is being fetched again", RETRY_APPEND_MS)),
+        }
+        Ok(())
+    }
+
+    /// What is due after every turn and every activation.
+    fn after(&mut self, reply: &Reply, ctx: &mut Context<Self>) {
+        self.ask_for_training(ctx);
+        let Stage::Awake(session) = &self.stage else { return };
+        if session.phase() != Phase::Learning {
+            let waited = Waited { status: session.status(), told: self.last_told.clone() };
+            for (_, answer) in self.waiters.drain(..) {
+                answer.send(Response::Waited(waited.clone()));
+            }
+        }
+        if reply.told.iter().any(|told| matches!(told, Told::EpisodeEnded { .. })) {
+            life::keep_snapshot(&self.life, &self.waking.stream, session);
+        }
+    }
+
+    fn ask_for_training(&mut self, ctx: &mut Context<Self>) {
+        let Stage::Awake(session) = &self.stage else { return };
+        if self.training {
+            return;
+        }
+        let Some(Outstanding::Retrain { recipe, lessons }) = session.outstanding() else { return };
+        let Some(place) = self.life.place_in_queue() else {
+            tracing::warn!(stream = %self.waking.stream, "the trainers' queue is full; asking again");
+            ctx.run_later(Duration::from_secs(TRAIN_AGAIN_S), |actor, ctx| {
+                actor.ask_for_training(ctx);
+            });
+            return;
+        };
+        self.training = true;
+        self.life.trainer().do_send(Train {
+            stream: self.waking.stream.clone(),
+            recipe,
+            lessons,
+            tell: ctx.address().recipient(),
+            place,
+            attention: self.waking.presence.attend(),
+        });
+    }
+
+    /// The state did not change: the turn is dropped. When it is certain that nothing was appended
+    /// either, the actor goes on; otherwise a new one reads what the log says.
+    fn append_failed(&mut self, error: AppendError, answer: Option<AnswerTo>) {
+        let (stream, sentence) = (&self.waking.stream, error.to_string());
+        tracing::warn!(%stream, %error, "an append failed");
+        let (response, stays) = match error {
+            AppendError::Busy { .. } => (Response::busy(sentence, RETRY_APPEND_MS), true),
+            AppendError::TooLarge { .. } => {
+                (Response::error(ErrorCode::Unavailable, sentence), true)
+            }
+            AppendError::Conflict { .. } => (Response::busy(sentence, RETRY_APPEND_MS), false),
+            AppendError::Erased | AppendError::Key { .. } => {
+                (Response::error(ErrorCode::Unavailable, sentence), false)
+            }
+            AppendError::Poisoned { .. } | AppendError::Gone => {
+                self.life.failure().report(sentence.clone());
+                (Response::error(ErrorCode::Unavailable, sentence), false)
+            }
+        };
+        respond(answer, response.clone());
+        if !stays {
+            self.leave(response);
+        }
+    }
+}
+
+impl<D: Domain> Actor for UserActor<D> {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        ctx.set_mailbox_capacity(MAILBOX_MAX);
+        let (life, stream, user) =
+            (self.life.clone(), self.waking.stream.clone(), self.waking.user.clone());
+        // Reading a long stream, or training a mind again, must not hold up the other people of
+        // this arbiter.
+        let rebuilt = tokio::task::spawn_blocking(move || life::wake(&life, &stream, &user));
+        ctx.wait(rebuilt.into_actor(self).map(|result, actor, ctx| {
+            let woken = result.unwrap_or_else(|panic| {
+                Err(Response::error(ErrorCode::Internal, format!("waking failed: {panic}")))
+            });
+            match woken {
+                Ok(session) => {
+                    actor.stage = Stage::Awake(Box::new(session));
+                    actor.ask_for_training(ctx);
+                }
+                Err(response) => {
+                    tracing::error!(stream = %actor.waking.stream, ?response, "cannot be woken");
+                    actor.leave(response);
+                }
+            }
+        }));
+    }
+}
+
+impl<D: Domain> Handler<Submit> for UserActor<D> {
+    type Result = AtomicResponse<Self, ()>;
+
+    fn handle(&mut self, submit: Submit, ctx: &mut Context<Self>) -> Self::Result {
+        let Submit { request, ask, answer, .. } = submit;
+        AtomicResponse::new(self.ask(ask, request, answer, ctx))
+    }
+}
+
+impl<D: Domain> Handler<Trained> for UserActor<D> {
+    type Result = AtomicResponse<Self, ()>;
+
+    /// The result of a training enters through the same door as an utterance.
+    fn handle(&mut self, trained: Trained, _: &mut Context<Self>) -> Self::Result {
+        let Trained { recipe, outcome, attention } = trained;
+        self.training = false;
+        let outcome = outcome.map(|mind| {
+            let learning::Report { exemplars, threshold, figures } = mind.report().clone();
+            let digest = mind.digest();
+            self.life.remember(&self.waking.stream.tenant, mind);
+            (digest, Report { exemplars, threshold, figures })
+        });
+        let command = Command::FinishRetrain { recipe, outcome };
+        let finish = self.perform(command, life::fresh_request(), None);
+        AtomicResponse::new(Box::pin(finish.map(move |_, actor, ctx| {
+            // Still outstanding if the append was refused; harmless if not.
+            actor.ask_for_training(ctx);
+            drop(attention);
+        })))
+    }
+}
+
+impl<D: Domain> Handler<Sleep> for UserActor<D> {
+    type Result = ();
+
+    fn handle(&mut self, _: Sleep, ctx: &mut Context<Self>) {
+        if let Stage::Awake(session) = &self.stage {
+            life::keep_snapshot(&self.life, &self.waking.stream, session);
+        }
+        ctx.stop();
+    }
+}
+
+fn respond(answer: Option<AnswerTo>, response: Response) {
+    if let Some(answer) = answer {
+        answer.send(response);
+    }
+}
+
+/// - errors: what to answer, and to leave with, when the session panicked.
+fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Response> {
+    catch_unwind(AssertUnwindSafe(|| match query {
+        Query::Status => Response::Status(session.status()),
+        Query::Known => Response::Known(session.known()),
+        Query::Look => match session.look() {
+            Some(view) => Response::Look(view),
+            None => Response::Rejected(Rejected {
+                code: RejectionCode::WrongPhase,
+                message: "there is nothing to see before the first episode; start one".to_owned(),
+            }),
+        },
+    }))
+    .map_err(|panic| defect("looking", &*panic))
+}
+
+fn defect(doing: &str, panic: &(dyn std::any::Any + Send)) -> Response {
+    let words = life::panic_words(panic);
+    tracing::error!(doing, %words, "a defect; the actor is replaced by one from the log");
+    Response::error(
+        ErrorCode::Internal,
+        format!(
+            "a defect of apprentice while {doing}; nothing was lost, please report it: {words}"
+        ),
+    )
+}

@@ -1,0 +1,101 @@
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use super::failure::Failure;
+use super::logging::Logging;
+use super::{converse, log, serve, talk, transcript};
+
+const AFTER_HELP: &str = "\
+Examples:
+  apprentice                                   talk to the robot; everything is kept
+  apprentice --seed 7 --task 'clean Mug CounterTop'
+                                               the same task and scene each time
+  printf 'go to the mug\\n' | apprentice --data demo
+                                               the goal and each answer, one line each
+  apprentice serve --data lab --zmq tcp://127.0.0.1:7117
+  apprentice talk --connect tcp://127.0.0.1:7117 --user ada
+  apprentice transcript check tests/transcripts/*.txt
+  apprentice log show --data demo --user you
+
+Exit codes:
+  0  fine; the end of input is fine too
+  1  differences were found, or it was tried and went wrong
+  2  bad usage, or a file or directory that cannot be used";
+
+/// A household robot that you talk to in your own words, and teach.
+///
+/// Without a command: a service of your own and a conversation with it in this terminal. What the
+/// robot does not understand, do with simple requests; after the task, say which of those actions
+/// your words stood for. With standard input not a terminal, lines are read from it.
+#[derive(Debug, Parser)]
+#[command(name = "apprentice", version, after_help = AFTER_HELP, args_conflicts_with_subcommands = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Verb>,
+    #[command(flatten)]
+    converse: converse::Arguments,
+    #[command(flatten)]
+    logging: Logging,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Serve(serve::Arguments),
+    Talk(talk::Arguments),
+    Transcript(transcript::Arguments),
+    Log(log::Arguments),
+}
+
+/// Reads the command line, does what it says and gives the exit code.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}
+
+fn run(arguments: Arguments) -> Result<(), Failure> {
+    // Who serves others wants to see that it runs; who talks wants to see the conversation.
+    let filter = match arguments.command {
+        Some(Verb::Serve(_)) => "info",
+        _ => "warn",
+    };
+    arguments.logging.start(filter)?;
+    match arguments.command {
+        None => converse::run(arguments.converse),
+        Some(Verb::Serve(arguments)) => serve::run(arguments),
+        Some(Verb::Talk(arguments)) => talk::run(arguments),
+        Some(Verb::Transcript(arguments)) => transcript::run(arguments),
+        Some(Verb::Log(arguments)) => log::run(arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_says_how_it_ends() {
+        let help = Arguments::command().render_help().to_string();
+        for part in ["Exit codes", "Examples", "--seed", "transcript", "--log-filter"] {
+            assert!(help.contains(part), "{part} is missing in\n{help}");
+        }
+    }
+
+    #[test]
+    fn options_of_a_conversation_do_not_slip_before_a_command() {
+        assert!(Arguments::try_parse_from(["apprentice", "--seed", "7", "serve"]).is_err());
+        let after = ["apprentice", "serve", "--data", "d", "--zmq", "tcp://127.0.0.1:1"];
+        assert!(Arguments::try_parse_from(after).is_ok());
+        let logging = ["apprentice", "talk", "--connect", "ipc://x", "--log-format", "json"];
+        assert!(Arguments::try_parse_from(logging).is_ok());
+    }
+}

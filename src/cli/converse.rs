@@ -1,0 +1,45 @@
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::failure::Failure;
+use super::{data_dir, embedded, recipe, terminal};
+use crate::service::Data;
+
+/// The file in the data directory that remembers what was typed.
+const HISTORY_FILE: &str = "history.txt";
+
+/// A service of one's own and a conversation with it.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Where everything is kept [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Who is talking: each person teaches a robot of their own.
+    #[arg(long, value_name = "NAME", default_value = "you")]
+    user: String,
+    /// Fixes scenes and tasks; the next episode has the next seed.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// What the first tasks are about, in order; give it again for the next one. Later tasks are
+    /// drawn.
+    #[arg(long, value_name = "'clean Mug CounterTop'")]
+    task: Vec<String>,
+    /// The recipe that a new person starts with: default, paper, or a file.
+    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    recipe: String,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let user = embedded::user(&arguments.user)?;
+    let recipe_text = recipe::load(&arguments.recipe)?;
+    let directory = data_dir::choose(arguments.data)?;
+    eprintln!("apprentice: everything is kept in {}", directory.display());
+    let history = directory.join(HISTORY_FILE);
+    let service = embedded::start(Data::Directory(directory), recipe_text, Vec::new())?;
+    let client = service.connect(user).map_err(Failure::failed)?;
+    let talked = terminal::talk(&client, arguments.seed, arguments.task, Some(&history));
+    drop(client);
+    let stopped = service.stop().map_err(Failure::failed);
+    talked.and(stopped)
+}

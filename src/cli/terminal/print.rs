@@ -1,0 +1,481 @@
+//! What the conversation shows, as text. Pure: every function here only builds strings.
+
+use crate::language::{Answer, Evidence, Near, Outcome, Program};
+use crate::session::{ActionView, KnownExemplar, Phase, Status, Teachable};
+use crate::world::View;
+
+/// The paper's sentence for an utterance that nothing known is close to.
+pub const NOT_SURE: &str = "I'm sorry - I don't understand!";
+
+/// The goal at the start of an episode.
+pub fn goal(goal: &str, fewest: Option<u32>) -> String {
+    match fewest {
+        Some(1) => format!("Goal: {goal}. (1 action would do.)"),
+        Some(fewest) => format!("Goal: {goal}. ({fewest} actions would do.)"),
+        None => format!("Goal: {goal}."),
+    }
+}
+
+/// An answer to an utterance: what was done, action by action, or why nothing was.
+///
+/// - `done`: the actions that this utterance led to.
+pub fn answer(answer: &Answer, done: &[ActionView]) -> Vec<String> {
+    match &answer.outcome {
+        Outcome::Understood { .. } => done.iter().map(action).collect(),
+        Outcome::Impossible { program, step, reason } => vec![impossible(program, *step, reason)],
+        Outcome::NotSure => vec![not_sure(&answer.evidence)],
+    }
+}
+
+/// `  3  picks up the mug from the counter top`
+pub fn action(action: &ActionView) -> String {
+    format!("{:>3}  {}", action.number, action.sentence)
+}
+
+fn impossible(program: &Program, step: u32, reason: &str) -> String {
+    let failing = program.steps.get(step as usize).map(ToString::to_string).unwrap_or_default();
+    let of = program.steps.len();
+    let reason = without_stop(reason);
+    match of {
+        1 => format!(
+            "I understand, but that cannot be done: {failing} would fail, because {reason}. \
+             I did nothing."
+        ),
+        _ => format!(
+            "I understand, but that cannot be done: step {} of {of}, {failing}, would fail, \
+             because {reason}. I did nothing. (I took it to mean: {program}.)",
+            step + 1
+        ),
+    }
+}
+
+fn not_sure(evidence: &Evidence) -> String {
+    match evidence.nearest.first() {
+        Some(near) => format!(
+            "{NOT_SURE} The nearest thing I know is \"{}\", at distance {:.2}; I go along up to \
+             {:.2}.",
+            near.exemplar, near.distance, evidence.threshold
+        ),
+        None => NOT_SURE.to_owned(),
+    }
+}
+
+/// The parts of the goal: `[x] the mug is clean  [ ] it is on the counter top`.
+pub fn progress(progress: &[(String, bool)]) -> String {
+    let part = |(words, holds): &(String, bool)| {
+        let mark = if *holds { 'x' } else { ' ' };
+        format!("[{mark}] {words}")
+    };
+    progress.iter().map(part).collect::<Vec<_>>().join("  ")
+}
+
+/// What the robot holds, from what it sees.
+pub fn holding(view: &View) -> String {
+    let held = |thing: &&crate::world::Thing| thing.states.iter().any(|state| state == "held");
+    match view.things.iter().find(held) {
+        Some(thing) => format!("holding {}", thing.name),
+        None => "holding nothing".to_owned(),
+    }
+}
+
+/// `:look`: the room in sentences, then what stands where.
+pub fn look(view: &View) -> Vec<String> {
+    let mut lines = view.summary.clone();
+    let mut places: Vec<&str> = Vec::new();
+    for place in view.things.iter().filter_map(|thing| thing.place.as_deref()) {
+        if !places.contains(&place) {
+            places.push(place);
+        }
+    }
+    for thing in &view.things {
+        let is_place = places.contains(&thing.name.as_str());
+        if thing.place.is_some() && !is_place {
+            continue;
+        }
+        let on_it: Vec<String> = view
+            .things
+            .iter()
+            .filter(|other| other.place.as_deref() == Some(thing.name.as_str()))
+            .map(|other| with_states(&other.name, &other.states))
+            .collect();
+        let name = with_states(&thing.name, &thing.states);
+        lines.push(match on_it.is_empty() {
+            true => format!("  {name}"),
+            false => format!("  {name}: {}", on_it.join(", ")),
+        });
+    }
+    lines
+}
+
+fn with_states(name: &str, states: &[String]) -> String {
+    match states.is_empty() {
+        true => name.to_owned(),
+        false => format!("{name} ({})", states.join(", ")),
+    }
+}
+
+/// `:why`: the evidence of an answer.
+pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
+    let evidence = &answer.evidence;
+    let mut lines = vec![format!("You said \"{utterance}\".")];
+    if !evidence.lifted.is_empty() {
+        let clauses: Vec<String> =
+            evidence.lifted.iter().map(|clause| format!("\"{clause}\"")).collect();
+        lines.push(format!("I read it as {}.", clauses.join(" and ")));
+    }
+    if evidence.nearest.is_empty() {
+        lines.push("I know nothing to compare it with.".to_owned());
+    } else {
+        lines.push(format!(
+            "The nearest things I know (I go along up to a distance of {:.2}):",
+            evidence.threshold
+        ));
+        lines.extend(evidence.nearest.iter().map(|near| nearest(near, evidence.threshold)));
+    }
+    for discarded in &evidence.discarded {
+        let reason = without_stop(&discarded.reason);
+        lines.push(format!("I dropped {}, because {reason}.", discarded.program));
+    }
+    if evidence.reranked > 1 {
+        lines.push(format!(
+            "{} readings were possible; what you taught me before chose among them.",
+            evidence.reranked
+        ));
+    }
+    lines.push(match &answer.outcome {
+        Outcome::Understood { program, .. } => format!("So I did {program}."),
+        Outcome::Impossible { program, step, .. } => {
+            format!("So I took it to mean {program}, but step {} cannot be done here.", step + 1)
+        }
+        Outcome::NotSure => "So I was not sure, and did nothing.".to_owned(),
+    });
+    lines
+}
+
+fn nearest(near: &Near, threshold: f32) -> String {
+    let verdict = if near.distance <= threshold { "near enough" } else { "too far" };
+    format!("  {:.2}  {:<11}  \"{}\" = {}", near.distance, verdict, near.exemplar, near.program)
+}
+
+/// `:known`: what was taught, with the numbers that `:forget` takes, then the seeds.
+pub fn known(known: &[KnownExemplar]) -> Vec<String> {
+    let line = |known: &KnownExemplar| {
+        let number = known.lesson.map(|seq| format!("#{seq}")).unwrap_or_default();
+        format!("  {number:>5}  \"{}\" = {}", known.exemplar.utterance, known.exemplar.program)
+    };
+    let (taught, seeds): (Vec<_>, Vec<_>) = known.iter().partition(|known| known.lesson.is_some());
+    let mut lines = Vec::new();
+    lines.push(match taught.len() {
+        0 => "You have taught me nothing yet.".to_owned(),
+        n => format!("You taught me {}:", count(n as u32, "request")),
+    });
+    lines.extend(taught.into_iter().map(line));
+    lines.push(format!("I came with {}:", count(seeds.len() as u32, "request")));
+    lines.extend(seeds.into_iter().map(line));
+    lines
+}
+
+/// `:status`.
+pub fn status(status: &Status) -> Vec<String> {
+    let mut lines = Vec::new();
+    let phase = match status.phase {
+        Phase::Idle => "between two tasks",
+        Phase::Interacting => "in a task",
+        Phase::Teaching => "being taught",
+        Phase::Learning => "learning",
+        Phase::Closed => "closed for good",
+    };
+    lines.push(format!(
+        "I am {phase}: task {}, {}, {}.",
+        status.episodes,
+        count(status.utterances, "utterance"),
+        count(status.actions.len() as u32, "action")
+    ));
+    if let Some(goal) = &status.goal {
+        lines.push(format!("Goal: {goal}. {}", progress(&status.progress)));
+    }
+    lines.extend(status.actions.iter().map(action));
+    lines.push(format!(
+        "I know {}, {} from you (recipe {}, mind {}).",
+        count(status.exemplars, "example"),
+        status.lessons,
+        status.recipe,
+        status.mind.short()
+    ));
+    lines
+}
+
+/// The question about one utterance, with the actions that it may stand for.
+pub fn teaching_question(said: &Teachable, actions: &[ActionView]) -> Vec<String> {
+    let why = match said.not_sure {
+        true => "I did not understand it",
+        false => "I understood it, but it could not be done",
+    };
+    let after = after(said, actions);
+    let mut lines = vec![format!("You said \"{}\" and {why}.", said.utterance)];
+    match (after.first(), after.last()) {
+        (Some(first), Some(last)) => {
+            lines.push("What I did after that:".to_owned());
+            lines.extend(after.iter().map(|done| action(done)));
+            lines.push(format!(
+                "Which of it was \"{}\"? Say a first and a last action such as {}-{}, or all, \
+                 none, skip.",
+                said.utterance, first.number, last.number
+            ));
+        }
+        _ => lines.push("I did nothing after that, so say none or skip.".to_owned()),
+    }
+    lines
+}
+
+/// The actions that came after an utterance.
+pub fn after<'a>(said: &Teachable, actions: &'a [ActionView]) -> Vec<&'a ActionView> {
+    actions.iter().filter(|action| action.number > said.actions_before).collect()
+}
+
+/// What a person is told when training is over.
+pub fn learned(examples: u32) -> String {
+    format!("learned: {}", count(examples, "example"))
+}
+
+pub fn help() -> Vec<String> {
+    let text = "\
+Say what the robot should do, in your own words: \"go to the mug and pick it up\".
+What it does not understand, do with simple requests; after the task you teach it.
+  :look      what the robot sees and holds
+  :why       why the last answer was what it was
+  :known     every request it knows; yours have numbers
+  :status    task, goal, progress, and the actions so far
+  :done      end this task now (so does plain done)
+  :task T    what the next task is, such as :task clean Mug CounterTop
+  :forget N  take back the lesson that :known shows as #N
+  :quit      leave; everything is kept (so does the end of input)";
+    text.lines().map(str::to_owned).collect()
+}
+
+pub fn teaching_help() -> Vec<String> {
+    let text = "\
+Say which actions the utterance stood for:
+  3-7        actions 3 to 7 (one action: 3)
+  all        everything shown
+  none       nothing that was done is what it meant
+  skip       say nothing about it
+  done       skip the rest and learn
+  teach \"wash the mug\" 3-7   another of the utterances, in one move";
+    text.lines().map(str::to_owned).collect()
+}
+
+/// Several lines as one, for whoever reads line by line.
+pub fn one_line(lines: &[String]) -> String {
+    let mut joined = String::new();
+    for line in lines.iter().map(|line| line.trim()) {
+        let gap = match joined.chars().last() {
+            None => "",
+            Some('.' | ':' | '!' | '?') => " ",
+            Some(_) => "; ",
+        };
+        joined.push_str(gap);
+        joined.push_str(line);
+    }
+    joined
+}
+
+/// What a person who comes back hears: where they are and what the robot has learned from them.
+pub fn welcome(user: &str, status: &Status) -> String {
+    if status.episodes == 0 {
+        return format!(
+            "Hello, {user}! I know {}; you teach me the rest. :help says how.",
+            count(status.exemplars, "example")
+        );
+    }
+    let lessons = match status.lessons {
+        0 => "no lesson yet".to_owned(),
+        n => count(n, "lesson"),
+    };
+    let now = match status.phase {
+        Phase::Interacting => "; you are in the middle of a task",
+        Phase::Teaching => "; you were teaching me",
+        Phase::Learning => "; I am still learning from your lessons",
+        Phase::Idle | Phase::Closed => "",
+    };
+    format!("Welcome back, {user}: {} so far, {lessons}{now}.", count(status.episodes, "task"))
+}
+
+/// `1 action`, `2 actions`.
+pub fn count(number: u32, noun: &str) -> String {
+    match number {
+        1 => format!("1 {noun}"),
+        n => format!("{n} {noun}s"),
+    }
+}
+
+fn without_stop(sentence: &str) -> &str {
+    sentence.trim_end_matches('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::Seq;
+    use crate::language::{Discarded, Exemplar, LiftedUtterance};
+    use crate::world::Thing;
+
+    fn done(number: u32, sentence: &str) -> ActionView {
+        ActionView { number, step: "GOTO Mug".into(), sentence: sentence.into() }
+    }
+
+    fn evidence() -> Evidence {
+        Evidence {
+            lifted: vec![LiftedUtterance::parse("wash the <obj>")],
+            nearest: vec![Near {
+                exemplar: LiftedUtterance::parse("pick up the <obj>"),
+                program: "PICKUP <obj:1>".parse().unwrap(),
+                distance: 0.914,
+                number: 3,
+            }],
+            threshold: 0.42,
+            discarded: vec![Discarded {
+                program: "PICKUP Mug".parse().unwrap(),
+                reason: "the hand is full.".into(),
+            }],
+            reranked: 2,
+        }
+    }
+
+    fn answered(outcome: Outcome) -> Answer {
+        Answer { outcome, evidence: evidence(), mentioned: None }
+    }
+
+    #[test]
+    fn what_was_done_is_numbered() {
+        let program = "GOTO Mug; PICKUP Mug".parse().unwrap();
+        let outcome = Outcome::Understood { program, bindings: vec![] };
+        let lines = answer(&answered(outcome), &[done(3, "goes to the mug"), done(12, "waits")]);
+        assert_eq!(lines, ["  3  goes to the mug", " 12  waits"]);
+    }
+
+    #[test]
+    fn not_sure_is_the_papers_sentence_and_what_is_nearest() {
+        let lines = answer(&answered(Outcome::NotSure), &[]);
+        assert_eq!(
+            lines,
+            ["I'm sorry - I don't understand! The nearest thing I know is \"pick up the <obj>\", \
+              at distance 0.91; I go along up to 0.42."]
+        );
+    }
+
+    #[test]
+    fn an_impossible_request_names_the_step_the_reason_and_that_nothing_was_done() {
+        let outcome = |program: &str, step| Outcome::Impossible {
+            program: program.parse().unwrap(),
+            step,
+            reason: "the fridge is closed".into(),
+        };
+        let lines = answer(&answered(outcome("GOTO Fridge; PUT Mug Fridge", 1)), &[]);
+        assert_eq!(
+            lines,
+            ["I understand, but that cannot be done: step 2 of 2, PUT Mug Fridge, would fail, \
+              because the fridge is closed. I did nothing. (I took it to mean: GOTO Fridge; PUT \
+              Mug Fridge.)"]
+        );
+        let lines = answer(&answered(outcome("PUT Mug Fridge", 0)), &[]);
+        assert!(lines[0].contains("PUT Mug Fridge would fail, because"), "{lines:?}");
+    }
+
+    #[test]
+    fn why_shows_the_distance_against_the_threshold_and_what_was_dropped() {
+        let lines = why("wash the mug", &answered(Outcome::NotSure));
+        let text = lines.join("\n");
+        for part in [
+            "I read it as \"wash the <obj>\".",
+            "up to a distance of 0.42",
+            "0.91  too far      \"pick up the <obj>\" = PICKUP <obj:1>",
+            "I dropped PICKUP Mug, because the hand is full.",
+            "2 readings were possible",
+            "So I was not sure, and did nothing.",
+        ] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+    }
+
+    #[test]
+    fn what_stands_where_is_grouped_by_place() {
+        let thing = |name: &str, place: Option<&str>, states: &[&str]| Thing {
+            name: name.into(),
+            kind: name.into(),
+            place: place.map(str::to_owned),
+            at: (0, 0),
+            states: states.iter().map(|state| (*state).to_owned()).collect(),
+        };
+        let view = View {
+            summary: vec!["You are in a kitchen.".into()],
+            things: vec![
+                thing("CounterTop", None, &[]),
+                thing("Mug", Some("CounterTop"), &["dirty"]),
+                thing("SinkBasin", Some("CounterTop"), &[]),
+                thing("Fork", Some("SinkBasin"), &[]),
+                thing("Apple", None, &["held"]),
+            ],
+        };
+        assert_eq!(
+            look(&view),
+            [
+                "You are in a kitchen.",
+                "  CounterTop: Mug (dirty), SinkBasin",
+                "  SinkBasin: Fork",
+                "  Apple (held)"
+            ]
+        );
+        assert_eq!(holding(&view), "holding Apple");
+    }
+
+    #[test]
+    fn lessons_come_before_seeds_and_have_numbers() {
+        let exemplar = |utterance: &str, lesson| KnownExemplar {
+            exemplar: Exemplar {
+                utterance: LiftedUtterance::parse(utterance),
+                program: "GOTO <obj:1>".parse().unwrap(),
+            },
+            lesson,
+        };
+        let lines = known(&[exemplar("go to <obj>", None), exemplar("visit <obj>", Seq::new(23))]);
+        assert_eq!(
+            lines,
+            [
+                "You taught me 1 request:",
+                "    #23  \"visit <obj>\" = GOTO <obj:1>",
+                "I came with 1 request:",
+                "         \"go to <obj>\" = GOTO <obj:1>"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_teaching_question_shows_only_what_came_after() {
+        let said = Teachable {
+            seq: Seq::FIRST,
+            utterance: "wash it".into(),
+            actions_before: 1,
+            not_sure: true,
+        };
+        let lines = teaching_question(&said, &[done(1, "a"), done(2, "b"), done(3, "c")]);
+        assert_eq!(lines[2..4], ["  2  b", "  3  c"]);
+        assert!(lines[4].contains("such as 2-3"), "{lines:?}");
+        let nothing = teaching_question(&said, &[done(1, "a")]);
+        assert!(nothing[1].contains("say none or skip"), "{nothing:?}");
+    }
+
+    #[test]
+    fn several_lines_become_one_without_losing_their_ends() {
+        let lines = ["Which?".to_owned(), "  1  a".to_owned(), "  2  b".to_owned()];
+        assert_eq!(one_line(&lines), "Which? 1  a; 2  b");
+    }
+
+    #[test]
+    fn progress_marks_what_holds() {
+        let parts = [("the mug is clean".to_owned(), true), ("it is away".to_owned(), false)];
+        assert_eq!(progress(&parts), "[x] the mug is clean  [ ] it is away");
+        assert_eq!(goal("wash the mug", Some(8)), "Goal: wash the mug. (8 actions would do.)");
+        assert_eq!(learned(45), "learned: 45 examples");
+    }
+}

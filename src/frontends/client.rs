@@ -1,0 +1,310 @@
+use std::time::{Duration, Instant};
+
+use super::wire::{self, Request};
+use super::{Context, Endpoint, EndpointError};
+use crate::actors::{Ask, Hello, Response, Waited};
+use crate::ids::{RequestId, Seq, UserId};
+use crate::limits::{CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, WAIT_S_MAX};
+use crate::session::{Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status};
+use crate::world::{Stage, View};
+
+/// One person's end of the wire: asks, waits, and asks again with the same request id, which is
+/// always safe.
+pub struct Client {
+    socket: zmq::Socket,
+    user: UserId,
+    endpoint: String,
+    patience: Duration,
+}
+
+/// Why there is no answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ClientError {
+    /// Normal: the service declined, and recorded nothing.
+    #[error("{message}")]
+    Rejected { code: RejectionCode, message: String },
+    #[error("{message}")]
+    Failed { code: crate::actors::ErrorCode, message: String },
+    /// Whether the request was carried out is not known; asking again with the same id will tell.
+    #[error("no answer from {endpoint} within {seconds} s; is the service running?")]
+    NoAnswer { endpoint: String, seconds: u64 },
+    #[error("the service at {endpoint} stayed busy for {seconds} s: {message}")]
+    Busy { endpoint: String, seconds: u64, message: String },
+    #[error("the request has {found} bytes; at most {FRAME_BYTES_MAX} can be sent")]
+    TooLarge { found: usize },
+    #[error("the service at {endpoint} answered something else than was asked: {reason}")]
+    Puzzling { endpoint: String, reason: String },
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+    #[error("cannot reach {endpoint}: {reason}")]
+    Socket { endpoint: String, reason: String },
+}
+
+/// How long the first attempt waits for its answer; each later one waits twice as long.
+const ATTEMPT: Duration = Duration::from_secs(2);
+/// The longest that one attempt waits.
+const ATTEMPT_MAX: Duration = Duration::from_secs(10);
+
+impl Client {
+    /// A client of a service in another process.
+    pub fn connect(endpoint: &str, user: UserId) -> Result<Client, ClientError> {
+        let endpoint = Endpoint::parse(endpoint)?.to_string();
+        Client::within(&Context::new(), &endpoint, user)
+    }
+
+    /// A client that shares `context` with the service.
+    pub fn within(context: &Context, endpoint: &str, user: UserId) -> Result<Client, ClientError> {
+        let open = || -> zmq::Result<zmq::Socket> {
+            let socket = context.socket(zmq::DEALER)?;
+            // A client that gives up must not keep its process from ending.
+            socket.set_linger(0)?;
+            socket.set_ipv6(endpoint.contains('['))?;
+            socket.connect(endpoint)?;
+            Ok(socket)
+        };
+        let socket = open().map_err(|error| ClientError::Socket {
+            endpoint: endpoint.to_owned(),
+            reason: error.to_string(),
+        })?;
+        let patience = Duration::from_secs(CLIENT_RETRY_S_MAX);
+        Ok(Client { socket, user, endpoint: endpoint.to_owned(), patience })
+    }
+
+    /// How long a request is retried before it is given up; [`CLIENT_RETRY_S_MAX`] at most, since
+    /// request ids are not remembered for ever.
+    pub fn with_patience(mut self, patience: Duration) -> Client {
+        self.patience = patience.min(Duration::from_secs(CLIENT_RETRY_S_MAX));
+        self
+    }
+
+    pub fn user(&self) -> &UserId {
+        &self.user
+    }
+
+    pub fn endpoint(&self) -> &str {
+        &self.endpoint
+    }
+
+    /// Who answers there.
+    pub fn hello(&self) -> Result<Hello, ClientError> {
+        match self.ask(Ask::Hello)? {
+            Response::Hello(hello) => Ok(hello),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    pub fn start(&self, stage: Stage) -> Result<Reply, ClientError> {
+        self.command(Command::StartEpisode { stage })
+    }
+
+    pub fn say(&self, utterance: &str) -> Result<Reply, ClientError> {
+        self.command(Command::Say { utterance: utterance.to_owned() })
+    }
+
+    pub fn done(&self) -> Result<Reply, ClientError> {
+        self.command(Command::Done)
+    }
+
+    /// `actions` are numbers of the episode's actions, a contiguous run; empty for "nothing did".
+    pub fn teach(
+        &self,
+        explains: Seq,
+        actions: Vec<u32>,
+        on_clash: OnClash,
+    ) -> Result<Reply, ClientError> {
+        self.command(Command::Teach { explains, actions, on_clash })
+    }
+
+    pub fn finish_teaching(&self) -> Result<Reply, ClientError> {
+        self.command(Command::FinishTeaching)
+    }
+
+    pub fn forget(&self, lesson: Seq) -> Result<Reply, ClientError> {
+        self.command(Command::Forget { lesson })
+    }
+
+    pub fn close(&self, reason: &str) -> Result<Reply, ClientError> {
+        self.command(Command::Close { reason: reason.to_owned() })
+    }
+
+    pub fn status(&self) -> Result<Status, ClientError> {
+        match self.ask(Ask::Query(Query::Status))? {
+            Response::Status(status) => Ok(status),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    pub fn look(&self) -> Result<View, ClientError> {
+        match self.ask(Ask::Query(Query::Look))? {
+            Response::Look(view) => Ok(view),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    pub fn known(&self) -> Result<Vec<KnownExemplar>, ClientError> {
+        match self.ask(Ask::Query(Query::Known))? {
+            Response::Known(known) => Ok(known),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    /// Waits until the training that runs is over, if one does.
+    ///
+    /// - errors: [`ClientError::NoAnswer`] when it is not over within `limit`.
+    pub fn wait_until_learned(&self, limit: Duration) -> Result<Waited, ClientError> {
+        let end = Instant::now() + limit;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let seconds = (left.as_secs() as u32).clamp(1, WAIT_S_MAX);
+            match self.ask(Ask::Wait { seconds })? {
+                Response::Waited(waited) if waited.status.phase != Phase::Learning => {
+                    return Ok(waited);
+                }
+                Response::Waited(_) if Instant::now() >= end => {
+                    return Err(ClientError::NoAnswer {
+                        endpoint: self.endpoint.clone(),
+                        seconds: limit.as_secs(),
+                    });
+                }
+                Response::Waited(_) => {}
+                other => return Err(self.puzzled(&other)),
+            }
+        }
+    }
+
+    /// Sends a command under a fresh request id.
+    pub fn command(&self, command: Command) -> Result<Reply, ClientError> {
+        self.command_again(fresh_id(), command)
+    }
+
+    /// Sends a command under a request id of the caller's: to ask again after a restart of either
+    /// end what came of it. A new command must have a new id.
+    pub fn command_again(&self, id: RequestId, command: Command) -> Result<Reply, ClientError> {
+        match self.ask_again(id, Ask::Command(command))? {
+            Response::Reply(reply) => Ok(reply),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    fn ask(&self, ask: Ask) -> Result<Response, ClientError> {
+        self.ask_again(fresh_id(), ask)
+    }
+
+    fn ask_again(&self, id: RequestId, ask: Ask) -> Result<Response, ClientError> {
+        let waits = match &ask {
+            Ask::Wait { seconds } => Duration::from_secs(u64::from(*seconds)),
+            _ => Duration::ZERO,
+        };
+        let bytes = wire::encode_request(&Request { id, user: self.user.clone(), ask });
+        if bytes.len() > FRAME_BYTES_MAX {
+            return Err(ClientError::TooLarge { found: bytes.len() });
+        }
+        let end = Instant::now() + self.patience + waits;
+        let (mut attempt, mut send, mut busy) = (ATTEMPT, true, None);
+        let mut pause = Duration::ZERO;
+        loop {
+            let now = Instant::now();
+            if now >= end {
+                return Err(self.gave_up(busy));
+            }
+            let until = match send {
+                true if pause.is_zero() => {
+                    self.send(&bytes)?;
+                    end.min(now + attempt + waits)
+                }
+                // Between a Busy and the next attempt: listening, since an earlier attempt's
+                // answer may still come.
+                _ => end.min(now + pause),
+            };
+            match self.answer_to(id, until)? {
+                Some(Response::Busy(answer)) => {
+                    pause = Duration::from_millis(u64::from(answer.retry_after_ms.clamp(1, 5_000)));
+                    busy = Some(answer.message);
+                    send = false;
+                }
+                Some(Response::Rejected(rejected)) => {
+                    let (code, message) = (rejected.code, rejected.message);
+                    return Err(ClientError::Rejected { code, message });
+                }
+                Some(Response::Error(failed)) => {
+                    let (code, message) = (failed.code, failed.message);
+                    return Err(ClientError::Failed { code, message });
+                }
+                Some(response) => return Ok(response),
+                None if !pause.is_zero() => (pause, send) = (Duration::ZERO, true),
+                None => attempt = ATTEMPT_MAX.min(attempt * 2),
+            }
+        }
+    }
+
+    fn send(&self, bytes: &[u8]) -> Result<(), ClientError> {
+        match self.socket.send(bytes, zmq::DONTWAIT) {
+            // A full pipe: the peer has been away for long. The next attempt sends again.
+            Ok(()) | Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => Ok(()),
+            Err(error) => Err(self.socket_error(error)),
+        }
+    }
+
+    /// The answer to `id`, or none until `until`. Answers to earlier requests are dropped.
+    fn answer_to(&self, id: RequestId, until: Instant) -> Result<Option<Response>, ClientError> {
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            // Rounded up, or the last millisecond would be spent spinning.
+            let left_ms = left.as_micros().div_ceil(1_000) as i64;
+            match self.socket.poll(zmq::POLLIN, left_ms) {
+                Ok(0) if Instant::now() >= until => return Ok(None),
+                Ok(0) | Err(zmq::Error::EINTR) => continue,
+                Ok(_) => {}
+                Err(error) => return Err(self.socket_error(error)),
+            }
+            let frames = match self.socket.recv_multipart(zmq::DONTWAIT) {
+                Ok(frames) => frames,
+                Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => continue,
+                Err(error) => return Err(self.socket_error(error)),
+            };
+            let [bytes] = &frames[..] else {
+                let reason = format!("a message of {} frames", frames.len());
+                return Err(ClientError::Puzzling { endpoint: self.endpoint.clone(), reason });
+            };
+            match wire::decode_response(bytes) {
+                Ok((found, response)) if found == id => return Ok(Some(response)),
+                Ok(_) => {}
+                Err(reason) => {
+                    return Err(ClientError::Puzzling { endpoint: self.endpoint.clone(), reason });
+                }
+            }
+        }
+    }
+
+    fn gave_up(&self, busy: Option<String>) -> ClientError {
+        let (endpoint, seconds) = (self.endpoint.clone(), self.patience.as_secs());
+        match busy {
+            Some(message) => ClientError::Busy { endpoint, seconds, message },
+            None => ClientError::NoAnswer { endpoint, seconds },
+        }
+    }
+
+    fn socket_error(&self, error: zmq::Error) -> ClientError {
+        ClientError::Socket { endpoint: self.endpoint.clone(), reason: error.to_string() }
+    }
+
+    fn puzzled(&self, response: &Response) -> ClientError {
+        let kind = match response {
+            Response::Reply(_) => "a reply",
+            Response::Status(_) => "a status",
+            Response::Look(_) => "a look",
+            Response::Known(_) => "exemplars",
+            Response::Waited(_) => "the end of a wait",
+            Response::Hello(_) => "a hello",
+            Response::Rejected(_) | Response::Busy(_) | Response::Error(_) => "a refusal",
+        };
+        ClientError::Puzzling { endpoint: self.endpoint.clone(), reason: kind.to_owned() }
+    }
+}
+
+/// A request id that nobody else has.
+pub fn fresh_id() -> RequestId {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).expect("the operating system gives random bytes");
+    RequestId(bytes)
+}

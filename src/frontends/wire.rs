@@ -1,0 +1,318 @@
+//! The wire, version 1: one MessagePack map for each message. See `schema/wire.md`.
+
+use std::fmt;
+use std::io::Cursor;
+
+use serde::de::{DeserializeOwned, IgnoredAny, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::actors::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
+use crate::ids::{RequestId, UserId};
+use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
+use crate::session::{Command, KnownExemplar, Query, Reply, Status};
+use crate::world::View;
+
+/// What this binary speaks and understands.
+pub const VERSION: u64 = 1;
+
+/// The commands that people may send, as they are spelled on the wire.
+pub const COMMANDS: [&str; 7] =
+    ["start_episode", "say", "done", "teach", "finish_teaching", "forget", "close"];
+/// Commands that come from inside the service alone.
+pub const INTERNAL_COMMANDS: [&str; 2] = ["open", "finish_retrain"];
+/// The queries, as they are spelled on the wire.
+pub const QUERIES: [&str; 5] = ["look", "known", "status", "wait", "hello"];
+
+/// A request as it was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    pub id: RequestId,
+    pub user: UserId,
+    pub ask: Ask,
+}
+
+/// Why a message is no request. Answerable when at least its id could be read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refused {
+    pub id: Option<RequestId>,
+    pub failed: Failed,
+}
+
+/// A query as it travels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum WireQuery {
+    Look,
+    Known,
+    Status,
+    Wait { seconds: u32 },
+    Hello,
+}
+
+#[derive(Serialize)]
+struct RequestMap<'a> {
+    v: u64,
+    id: RequestId,
+    user: &'a UserId,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<&'a Command>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    query: Option<WireQuery>,
+}
+
+// A request is read field by field, so that each fault is named and, whatever else is wrong, the
+// refusal reaches the caller who waits for it.
+#[derive(Deserialize)]
+struct IdField {
+    id: RequestId,
+}
+
+#[derive(Deserialize)]
+struct VersionField {
+    v: u64,
+}
+
+#[derive(Deserialize)]
+struct UserField {
+    user: UserId,
+}
+
+#[derive(Deserialize)]
+struct VerbFields {
+    #[serde(default)]
+    command: Option<Verb>,
+    #[serde(default)]
+    query: Option<Verb>,
+}
+
+#[derive(Deserialize)]
+struct CommandField {
+    command: Command,
+}
+
+#[derive(Deserialize)]
+struct QueryField {
+    query: WireQuery,
+}
+
+/// The request as one MessagePack map.
+///
+/// - panics: never; requests are plain data.
+pub fn encode_request(request: &Request) -> Vec<u8> {
+    let (command, query) = match &request.ask {
+        Ask::Command(command) => (Some(command), None),
+        Ask::Query(Query::Look) => (None, Some(WireQuery::Look)),
+        Ask::Query(Query::Known) => (None, Some(WireQuery::Known)),
+        Ask::Query(Query::Status) => (None, Some(WireQuery::Status)),
+        Ask::Wait { seconds } => (None, Some(WireQuery::Wait { seconds: *seconds })),
+        Ask::Hello => (None, Some(WireQuery::Hello)),
+    };
+    let map = RequestMap { v: VERSION, id: request.id, user: &request.user, command, query };
+    pack(&map)
+}
+
+/// Reads a request. Unknown fields are ignored; unknown verbs are refused by name.
+///
+/// - errors: [`Refused`], with one sentence; never panics, whatever the bytes.
+pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
+    let id = unpack::<IdField>(bytes).map(|field| field.id);
+    let refuse = |code, message: String| Refused {
+        id: id.as_ref().ok().copied(),
+        failed: Failed { code, message },
+    };
+    if bytes.len() > FRAME_BYTES_MAX {
+        let found = bytes.len();
+        let message = format!("the message has {found} bytes; at most {FRAME_BYTES_MAX} are read");
+        return Err(refuse(ErrorCode::TooLarge, message));
+    }
+    let malformed = |what: &str, reason: String| {
+        refuse(ErrorCode::Malformed, format!("the request's {what} cannot be read: {reason}"))
+    };
+    let checked_id = match &id {
+        Ok(id) => *id,
+        Err(reason) => return Err(malformed("id", reason.clone())),
+    };
+    let version = unpack::<VersionField>(bytes).map_err(|reason| malformed("v", reason))?.v;
+    if version != VERSION {
+        let message =
+            format!("wire version {version} is not spoken here; this service speaks {VERSION}");
+        return Err(refuse(ErrorCode::UnsupportedVersion, message));
+    }
+    let user = unpack::<UserField>(bytes).map_err(|reason| malformed("user", reason))?.user;
+    let verbs = unpack::<VerbFields>(bytes).map_err(|reason| malformed("verb", reason))?;
+    let ask = match (verbs.command, verbs.query) {
+        (Some(Verb(verb)), None) => {
+            check_command(&verb).map_err(|(code, message)| refuse(code, message))?;
+            let command = unpack::<CommandField>(bytes)
+                .map_err(|reason| malformed(&format!("command {verb:?}"), reason))?;
+            Ask::Command(command.command)
+        }
+        (None, Some(Verb(verb))) => {
+            check_query(&verb).map_err(|message| refuse(ErrorCode::UnknownVerb, message))?;
+            let query = unpack::<QueryField>(bytes)
+                .map_err(|reason| malformed(&format!("query {verb:?}"), reason))?;
+            match query.query {
+                WireQuery::Look => Ask::Query(Query::Look),
+                WireQuery::Known => Ask::Query(Query::Known),
+                WireQuery::Status => Ask::Query(Query::Status),
+                WireQuery::Wait { seconds } => Ask::Wait { seconds },
+                WireQuery::Hello => Ask::Hello,
+            }
+        }
+        (Some(_), Some(_)) => {
+            let message = "a request has a command or a query, this one has both".to_owned();
+            return Err(refuse(ErrorCode::Malformed, message));
+        }
+        (None, None) => {
+            let message = "a request has a command or a query, this one has neither".to_owned();
+            return Err(refuse(ErrorCode::Malformed, message));
+        }
+    };
+    Ok(Request { id: checked_id, user, ask })
+}
+
+fn check_command(verb: &str) -> Result<(), (ErrorCode, String)> {
+    if COMMANDS.contains(&verb) {
+        return Ok(());
+    }
+    if INTERNAL_COMMANDS.contains(&verb) {
+        let message = format!("the command {verb:?} comes from inside the service alone");
+        return Err((ErrorCode::InternalVerb, message));
+    }
+    let known = COMMANDS.join(", ");
+    let message = format!("unknown command {:?}; the commands are {known}", shorten(verb));
+    Err((ErrorCode::UnknownVerb, message))
+}
+
+fn check_query(verb: &str) -> Result<(), String> {
+    match QUERIES.contains(&verb) {
+        true => Ok(()),
+        false => Err(format!(
+            "unknown query {:?}; the queries are {}",
+            shorten(verb),
+            QUERIES.join(", ")
+        )),
+    }
+}
+
+fn shorten(text: &str) -> String {
+    text.chars().take(40).collect()
+}
+
+/// A response as it travels: the id of the request, and exactly one of the other fields.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct ResponseMap {
+    v: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<RequestId>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reply: Option<Reply>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    status: Option<Status>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    look: Option<View>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    known: Option<Vec<KnownExemplar>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    waited: Option<Waited>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hello: Option<Hello>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rejected: Option<Rejected>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    busy: Option<Busy>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<Failed>,
+}
+
+/// The response to the request `id` as one MessagePack map.
+///
+/// - panics: never; responses are plain data.
+pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
+    let mut map = ResponseMap { v: VERSION, id: Some(id), ..ResponseMap::default() };
+    match response {
+        Response::Reply(reply) => map.reply = Some(reply),
+        Response::Status(status) => map.status = Some(status),
+        Response::Look(view) => map.look = Some(view),
+        Response::Known(known) => map.known = Some(known),
+        Response::Waited(waited) => map.waited = Some(waited),
+        Response::Hello(hello) => map.hello = Some(hello),
+        Response::Rejected(rejected) => map.rejected = Some(rejected),
+        Response::Busy(busy) => map.busy = Some(busy),
+        Response::Error(failed) => map.error = Some(failed),
+    }
+    pack(&map)
+}
+
+/// Reads a response and the id of the request that it answers. Unknown fields are ignored.
+///
+/// - errors: a sentence; never panics, whatever the bytes.
+pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
+    let map: ResponseMap = unpack(bytes)?;
+    if map.v != VERSION {
+        return Err(format!("wire version {} is not spoken here; {VERSION} is", map.v));
+    }
+    let id = map.id.ok_or("the response carries no request id")?;
+    let found = [
+        map.reply.map(Response::Reply),
+        map.status.map(Response::Status),
+        map.look.map(Response::Look),
+        map.known.map(Response::Known),
+        map.waited.map(Response::Waited),
+        map.hello.map(Response::Hello),
+        map.rejected.map(Response::Rejected),
+        map.busy.map(Response::Busy),
+        map.error.map(Response::Error),
+    ];
+    let mut found = found.into_iter().flatten();
+    match (found.next(), found.next()) {
+        (Some(response), None) => Ok((id, response)),
+        (None, _) => Err("the response carries nothing that this client knows".to_owned()),
+        (Some(_), Some(_)) => Err("the response carries more than one answer".to_owned()),
+    }
+}
+
+/// The name of a verb: a text, or the only key of a map.
+struct Verb(String);
+
+impl<'de> Deserialize<'de> for Verb {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Verb, D::Error> {
+        struct VerbVisitor;
+        impl<'de> Visitor<'de> for VerbVisitor {
+            type Value = Verb;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a verb, or a map from one verb to its arguments")
+            }
+            fn visit_str<E: serde::de::Error>(self, verb: &str) -> Result<Verb, E> {
+                Ok(Verb(verb.to_owned()))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Verb, A::Error> {
+                use serde::de::Error;
+                let expected =
+                    || A::Error::custom("a map from one verb to its arguments is wanted");
+                let (verb, _) = map.next_entry::<String, IgnoredAny>()?.ok_or_else(expected)?;
+                match map.next_key::<IgnoredAny>()? {
+                    None => Ok(Verb(verb)),
+                    Some(_) => Err(expected()),
+                }
+            }
+        }
+        deserializer.deserialize_any(VerbVisitor)
+    }
+}
+
+fn pack<T: Serialize>(value: &T) -> Vec<u8> {
+    rmp_serde::to_vec_named(value).expect("wire messages are plain data and encode into memory")
+}
+
+fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    let mut decoder = rmp_serde::Deserializer::new(Cursor::new(bytes));
+    // Nested maps from a stranger must not overflow the gateway's stack.
+    decoder.set_max_depth(WIRE_DEPTH_MAX);
+    let value = T::deserialize(&mut decoder).map_err(|error| error.to_string())?;
+    match decoder.position() == bytes.len() as u64 {
+        true => Ok(value),
+        false => Err("bytes follow after the end of the map".to_owned()),
+    }
+}

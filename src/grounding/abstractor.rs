@@ -1,0 +1,226 @@
+use super::names::Names;
+use super::settings::{Abstraction, Split};
+use crate::language::{Clause, LiftedUtterance, Mention, Utterance, Word};
+use crate::limits::{CLAUSES_MAX, MENTIONS_MAX};
+use crate::world::Lexicon;
+
+/// Words that may stand between "from" and a name.
+const DETERMINERS: [&str; 9] = ["the", "a", "an", "its", "his", "her", "their", "your", "my"];
+/// Words that open a phrase which says where a thing is.
+const LOCATION: &str = "from";
+
+/// Entity abstraction: finds the mentions in an utterance and puts slots in their places (paper,
+/// section 3.1.1).
+pub struct Abstractor<'a> {
+    lexicon: &'a Lexicon,
+    names: Names<'a>,
+    settings: &'a Abstraction,
+    known: &'a dyn Fn(&str) -> bool,
+}
+
+/// An utterance with its mentions found, not yet cut into clauses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Abstracted {
+    pieces: Vec<Piece>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Piece {
+    Word(String),
+    /// `,` `.` or `;`.
+    Mark,
+    Named {
+        mention: Mention,
+        /// Swallowed words before the name.
+        attributes: Vec<String>,
+        fixture: Option<String>,
+        /// Everything this piece was made of, as said.
+        said: Vec<String>,
+    },
+}
+
+impl<'a> Abstractor<'a> {
+    /// - `known`: whether a word is in ordinary use (in the word table); such a word is never
+    ///   taken for a misspelt name.
+    pub fn new(
+        lexicon: &'a Lexicon,
+        settings: &'a Abstraction,
+        known: &'a dyn Fn(&str) -> bool,
+    ) -> Abstractor<'a> {
+        Abstractor { lexicon, names: Names::new(lexicon), settings, known }
+    }
+
+    /// Finds the mentions. From the [`MENTIONS_MAX`]-th on, names stay plain words.
+    pub fn read(&self, utterance: &Utterance) -> Abstracted {
+        let tokens = utterance.tokens();
+        let tokens: Vec<&str> = tokens.iter().map(String::as_str).collect();
+        let mut pieces = Vec::with_capacity(tokens.len());
+        let mut mentions = 0;
+        let mut at = 0;
+        while at < tokens.len() {
+            let token = tokens[at];
+            if is_mark(token) {
+                pieces.push(Piece::Mark);
+                at += 1;
+                continue;
+            }
+            let ahead = &tokens[at..];
+            let end = ahead.iter().position(|token| is_mark(token)).unwrap_or(ahead.len());
+            match self.mention(&ahead[..end]) {
+                Some((count, mention)) if mentions < MENTIONS_MAX => {
+                    mentions += 1;
+                    let said = ahead[..count].iter().map(|word| (*word).to_owned()).collect();
+                    mentions -= self.push_named(&mut pieces, mention, said);
+                    at += count;
+                }
+                _ => {
+                    pieces.push(Piece::Word(token.to_owned()));
+                    at += 1;
+                }
+            }
+        }
+        Abstracted { pieces }
+    }
+
+    fn mention(&self, words: &[&str]) -> Option<(usize, Mention)> {
+        self.names.starting(words).or_else(|| {
+            self.settings.spelling.then(|| self.names.misspelt(words, self.known)).flatten()
+        })
+    }
+
+    /// - returns: how many mentions before this one were folded into it.
+    fn push_named(
+        &self,
+        pieces: &mut Vec<Piece>,
+        mention: Mention,
+        mut said: Vec<String>,
+    ) -> usize {
+        let mut attributes = Vec::new();
+        let mut folded = 0;
+        let mut take = |words: Vec<String>, attributes: &mut Vec<String>| {
+            attributes.splice(0..0, words.iter().cloned());
+            said.splice(0..0, words);
+        };
+        // Nothing that opens a clause is swallowed: it is the verb ("clear table").
+        while !mention.pronoun && pieces.len() >= 2 && !opens_clause(&pieces[pieces.len() - 2]) {
+            match pieces.last() {
+                Some(Piece::Word(word))
+                    if self.settings.adjectives && self.lexicon.adjectives.contains(word) =>
+                {
+                    let word = word.clone();
+                    pieces.pop();
+                    take(vec![word], &mut attributes);
+                }
+                Some(Piece::Named { mention: before, said: words, .. })
+                    if self.settings.compounds && !before.pronoun =>
+                {
+                    let words = words.clone();
+                    pieces.pop();
+                    folded += 1;
+                    take(words, &mut attributes);
+                }
+                _ => break,
+            }
+        }
+        let fixture = self.fixture(&mention);
+        pieces.push(Piece::Named { mention, attributes, fixture, said });
+        folded
+    }
+
+    fn fixture(&self, mention: &Mention) -> Option<String> {
+        if !self.settings.fixtures {
+            return None;
+        }
+        let word = |kind| self.lexicon.fixtures.get(kind);
+        let all_fixtures = mention.types.iter().all(|kind| word(kind).is_some());
+        mention.types.first().filter(|_| all_fixtures).and_then(word).cloned()
+    }
+}
+
+impl Abstracted {
+    /// The utterance as one clause, "and" and all.
+    pub fn whole(&self) -> Clause {
+        clause(self.pieces.iter())
+    }
+
+    /// The clauses between the places where `split` cuts; `None` when there is nothing to cut or
+    /// when there would be more than [`CLAUSES_MAX`].
+    pub fn clauses(&self, split: Split) -> Option<Vec<Clause>> {
+        let parts = self.pieces.split(|piece| cuts(piece, split));
+        let clauses: Vec<Clause> = parts
+            .filter(|part| part.iter().any(|piece| !matches!(piece, Piece::Mark)))
+            .map(|part| clause(part.iter()))
+            .collect();
+        (2..=CLAUSES_MAX).contains(&clauses.len()).then_some(clauses)
+    }
+}
+
+/// The clause without "from the <obj>" phrases that come after another mention: "pick up the mug
+/// from the table". `None` when it has none.
+pub fn without_locations(whole: &Clause) -> Option<Clause> {
+    let words = &whole.lifted.words;
+    let is_slot = |word: &Word| matches!(word, Word::Slot { .. });
+    let mut kept = Clause { words: whole.words.clone(), ..Clause::default() };
+    let mut slot = 0;
+    let mut at = 0;
+    while at < words.len() {
+        let opens = |word: &Word| matches!(word, Word::Text(text) if text == LOCATION);
+        let determines =
+            |word: &&Word| matches!(word, Word::Text(text) if DETERMINERS.contains(&text.as_str()));
+        if opens(&words[at]) && !kept.attributes.is_empty() {
+            let skipped = words[at + 1..].iter().take_while(determines).count();
+            let after = at + 1 + skipped;
+            if words.get(after).is_some_and(is_slot) {
+                slot += 1;
+                at = after + 1;
+                continue;
+            }
+        }
+        if is_slot(&words[at]) {
+            kept.attributes.push(whole.attributes[slot].clone());
+            kept.mentions.extend(whole.mentions.get(slot).cloned());
+            slot += 1;
+        }
+        kept.lifted.words.push(words[at].clone());
+        at += 1;
+    }
+    (kept.lifted.words.len() < words.len()).then_some(kept)
+}
+
+fn clause<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Clause {
+    let mut out = Clause { lifted: LiftedUtterance::default(), ..Clause::default() };
+    for piece in pieces {
+        match piece {
+            Piece::Mark => {}
+            Piece::Word(word) => {
+                out.lifted.words.push(Word::Text(word.clone()));
+                out.words.push(word.clone());
+            }
+            Piece::Named { mention, attributes, fixture, said } => {
+                let (sort, fixture) = (mention.sort.clone(), fixture.clone());
+                out.lifted.words.push(Word::Slot { sort, fixture });
+                out.words.extend(said.iter().cloned());
+                out.attributes.push(attributes.clone());
+                out.mentions.push(mention.clone());
+            }
+        }
+    }
+    out
+}
+
+fn is_mark(token: &str) -> bool {
+    matches!(token, "," | "." | ";")
+}
+
+fn cuts(piece: &Piece, split: Split) -> bool {
+    match piece {
+        Piece::Word(word) => word == "and" || (split == Split::Clauses && word == "then"),
+        Piece::Mark => split == Split::Clauses,
+        Piece::Named { .. } => false,
+    }
+}
+
+/// Whether the next word is the first of a clause, however clauses are cut.
+fn opens_clause(before: &Piece) -> bool {
+    cuts(before, Split::Clauses)
+}

@@ -1,0 +1,328 @@
+use super::moment::Moment;
+use super::resolver::resolve;
+use super::settings::Execution;
+use crate::language::{
+    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol,
+};
+use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
+use crate::world::Domain;
+
+/// A lifted program that the parser offers for a clause.
+#[derive(Debug, Clone)]
+pub struct Offer<'a> {
+    /// The clause in the reading that the program was found for.
+    pub clause: &'a Clause,
+    pub program: LiftedProgram,
+    pub distance: f32,
+    /// Whether the clause has exactly the exemplar's lifted form.
+    pub exact: bool,
+    /// Whether the exemplar is a seed.
+    pub seed: bool,
+}
+
+/// A ground program for the whole utterance, and what the world says to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    pub program: Program,
+    /// The largest of its clauses' distances: a chain is as sure as its weakest link.
+    pub distance: f32,
+    pub seed: bool,
+    pub verdict: Verdict,
+    pub lifted: Vec<LiftedUtterance>,
+    /// What was named last, for a later "it".
+    pub mentioned: Option<Symbol>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// It runs; per step the things it acts on.
+    Runs { bindings: Vec<Vec<String>> },
+    /// The words make sense and the world forbids the 0-based `step`.
+    Forbidden { step: u32, reason: String },
+    /// The words do not fill the program.
+    Unfilled { reason: String },
+}
+
+/// The cross product of the clauses' offers, each combination grounded and run on a copy of the
+/// scene (paper, section 3.1.3). A clause is grounded in the scene that the clauses before it lead
+/// to, so "it" follows the hand.
+///
+/// - returns: at most [`COMBINATIONS_MAX`], in the order of the offers, the last clause's varying
+///   fastest.
+pub fn combine<D: Domain>(
+    moment: &Moment<'_, D>,
+    execution: &Execution,
+    clauses: &[Vec<Offer<'_>>],
+) -> Vec<Candidate> {
+    let start = Partial {
+        scene: moment.scene.clone(),
+        candidate: Candidate {
+            program: Program { steps: Vec::new() },
+            distance: 0.0,
+            seed: true,
+            verdict: Verdict::Runs { bindings: Vec::new() },
+            lifted: Vec::new(),
+            mentioned: moment.mentioned.cloned(),
+        },
+    };
+    let mut done = Vec::new();
+    if !clauses.is_empty() {
+        extend(&Ground { moment, execution }, clauses, &start, &mut done);
+    }
+    done
+}
+
+/// The first clauses of a combination, and the scene they lead to.
+struct Partial<S> {
+    scene: S,
+    candidate: Candidate,
+}
+
+fn extend<D: Domain>(
+    ground: &Ground<'_, D>,
+    clauses: &[Vec<Offer<'_>>],
+    partial: &Partial<D::Scene>,
+    done: &mut Vec<Candidate>,
+) {
+    let Some((next, rest)) = clauses.split_first() else {
+        done.push(partial.candidate.clone());
+        return;
+    };
+    for offer in next {
+        if done.len() >= COMBINATIONS_MAX {
+            return;
+        }
+        extend(ground, rest, &ground.advance(partial, offer), done);
+    }
+}
+
+struct Ground<'a, D: Domain> {
+    moment: &'a Moment<'a, D>,
+    execution: &'a Execution,
+}
+
+impl<D: Domain> Ground<'_, D> {
+    /// Grounds one more clause. Once a step is forbidden nothing more is run, but the program is
+    /// completed, so that the answer can show all of what was understood.
+    fn advance(&self, partial: &Partial<D::Scene>, offer: &Offer<'_>) -> Partial<D::Scene> {
+        let domain = self.moment.domain;
+        let before = partial.candidate.mentioned.as_ref();
+        let referents = resolve(domain, &partial.scene, &offer.clause.mentions, before);
+        let held = domain.held(&partial.scene);
+        let mut first = None;
+        for types in choices(&referents.types, &offer.program) {
+            let filled = fill(&offer.program, &offer.clause.mentions, &types, held.as_ref());
+            let next = self.try_filled(partial, offer, filled, named_last(&types, before));
+            let runs = matches!(next.candidate.verdict, Verdict::Runs { .. });
+            if runs {
+                return next;
+            }
+            first.get_or_insert(next);
+        }
+        first.expect("there is always the choice of every mention's best type")
+    }
+
+    fn try_filled(
+        &self,
+        partial: &Partial<D::Scene>,
+        offer: &Offer<'_>,
+        filled: Filled,
+        mentioned: Option<Symbol>,
+    ) -> Partial<D::Scene> {
+        let so_far = &partial.candidate;
+        let mut scene = partial.scene.clone();
+        let mut steps = so_far.program.steps.clone();
+        let mut verdict = so_far.verdict.clone();
+        if let Verdict::Runs { bindings } = &mut verdict {
+            let failed = match filled.missing {
+                Some(Missing::Slot { reason }) => Some(Verdict::Unfilled { reason }),
+                Some(Missing::Meaning { step, reason }) => {
+                    let step = (steps.len() + step) as u32;
+                    Some(Verdict::Forbidden { step, reason })
+                }
+                None => self
+                    .run(&mut scene, &mut steps, bindings, offer, &filled.program)
+                    .err()
+                    .map(|(step, reason)| Verdict::Forbidden { step, reason }),
+            };
+            if let Some(failed) = failed {
+                verdict = failed;
+                // The scene stays as it was before the clause: none of it will be carried out.
+                scene = partial.scene.clone();
+                steps.truncate(so_far.program.steps.len());
+                steps.extend(filled.program.steps);
+            }
+        } else {
+            steps.extend(filled.program.steps);
+        }
+        if steps.len() > PROGRAM_STEPS_MAX {
+            let found = steps.len();
+            steps.truncate(PROGRAM_STEPS_MAX);
+            let reason =
+                format!("that would take {found} steps; at most {PROGRAM_STEPS_MAX} are allowed");
+            verdict = Verdict::Unfilled { reason };
+        }
+        let mut lifted = so_far.lifted.clone();
+        lifted.push(offer.clause.lifted.clone());
+        let candidate = Candidate {
+            program: Program { steps },
+            distance: so_far.distance.max(offer.distance),
+            seed: so_far.seed && offer.seed,
+            verdict,
+            lifted,
+            mentioned,
+        };
+        Partial { scene, candidate }
+    }
+
+    /// Carries the steps out on the copy of the scene.
+    ///
+    /// - errors: the 0-based step, counted over the whole program, and the reason.
+    fn run(
+        &self,
+        scene: &mut D::Scene,
+        steps: &mut Vec<Step>,
+        bindings: &mut Vec<Vec<String>>,
+        offer: &Offer<'_>,
+        program: &Program,
+    ) -> Result<(), (u32, String)> {
+        let (domain, task) = (self.moment.domain, self.moment.task);
+        let before = steps.len();
+        if self.execution.polarity
+            && let Some((step, reason)) = domain.contradiction(scene, &offer.clause.words, program)
+        {
+            return Err(((before + step) as u32, reason));
+        }
+        for (index, step) in program.steps.iter().enumerate() {
+            if steps.len() >= PROGRAM_STEPS_MAX {
+                return Err(((before + index) as u32, "the program is too long".to_owned()));
+            }
+            let refused = |reason| ((before + index) as u32, reason);
+            domain.signature().check(step).map_err(refused)?;
+            let mut unasked = 0;
+            let bound = loop {
+                let refusal = match domain.step(scene, task, step) {
+                    Ok(bound) => break bound,
+                    Err(refusal) => refusal,
+                };
+                // What is in the fridge across the room takes two: going there and opening it.
+                let first = refusal.first.filter(|_| self.execution.approach);
+                let Some(first) = first.filter(|_| unasked < UNASKED_STEPS_MAX) else {
+                    return Err(refused(refusal.reason));
+                };
+                let bound = domain.step(scene, task, &first).map_err(|e| refused(e.reason))?;
+                steps.push(first);
+                bindings.push(bound);
+                unasked += 1;
+            };
+            bindings.push(bound);
+            steps.push(step.clone());
+        }
+        Ok(())
+    }
+}
+
+/// Steps taken unasked before one step that needs them.
+const UNASKED_STEPS_MAX: usize = 3;
+
+/// Which types the mentions are tried with: first the best of each; then, one mention at a time,
+/// the others that share its name ("cup" when only the mug can be picked up).
+fn choices(types: &[Vec<Symbol>], program: &LiftedProgram) -> Vec<Vec<Option<Symbol>>> {
+    let best: Vec<Option<Symbol>> = types.iter().map(|types| types.first().cloned()).collect();
+    let mut all = vec![best.clone()];
+    for (index, others) in types.iter().enumerate() {
+        let used = program.steps.iter().flat_map(|step| &step.args).any(
+            |arg| matches!(arg, LiftedArg::Slot { number, .. } if *number as usize == index + 1),
+        );
+        for other in others.iter().skip(1).filter(|_| used) {
+            if all.len() >= TYPE_CHOICES_MAX {
+                return all;
+            }
+            let mut choice = best.clone();
+            choice[index] = Some(other.clone());
+            all.push(choice);
+        }
+    }
+    all
+}
+
+fn named_last(types: &[Option<Symbol>], before: Option<&Symbol>) -> Option<Symbol> {
+    types.iter().rev().flatten().next().or(before).cloned()
+}
+
+/// A lifted program with its slots filled, as far as that went.
+struct Filled {
+    program: Program,
+    missing: Option<Missing>,
+}
+
+enum Missing {
+    /// The utterance has no such mention: the program is not what it asks for.
+    Slot { reason: String },
+    /// The mention is there, but nothing tells what it means.
+    Meaning { step: usize, reason: String },
+}
+
+/// What cannot be filled keeps the word that stood for it, so that the answer can show it.
+fn fill(
+    program: &LiftedProgram,
+    mentions: &[Mention],
+    types: &[Option<Symbol>],
+    held: Option<&Symbol>,
+) -> Filled {
+    let mut missing = None;
+    let mut steps = Vec::with_capacity(program.steps.len());
+    for (index, step) in program.steps.iter().enumerate() {
+        let mut fill_arg = |arg: &LiftedArg| {
+            let (lacking, stand_in) = match arg {
+                LiftedArg::Constant(symbol) => return symbol.clone(),
+                LiftedArg::Held => match held {
+                    Some(held) => return held.clone(),
+                    None => {
+                        let reason = "the robot holds nothing".to_owned();
+                        (Missing::Meaning { step: index, reason }, arg.to_string())
+                    }
+                },
+                LiftedArg::Slot { number, .. } => {
+                    let place = *number as usize - 1;
+                    match (mentions.get(place), types.get(place)) {
+                        (_, Some(Some(kind))) => return kind.clone(),
+                        (Some(mention), _) => {
+                            (unexplained(index, mention), mention.surface.clone())
+                        }
+                        (None, _) => {
+                            let reason = format!(
+                                "it takes {} named things, and {} were named",
+                                program.slots(),
+                                mentions.len()
+                            );
+                            (Missing::Slot { reason }, arg.to_string())
+                        }
+                    }
+                }
+            };
+            // A missing slot outweighs a missing meaning: it says the program is another one.
+            let replace = matches!(
+                (&missing, &lacking),
+                (None, _) | (Some(Missing::Meaning { .. }), Missing::Slot { .. })
+            );
+            if replace {
+                missing = Some(lacking);
+            }
+            Symbol::new(&stand_in)
+        };
+        let args = step.args.iter().map(&mut fill_arg).collect();
+        steps.push(Step { operator: step.operator.clone(), args });
+    }
+    Filled { program: Program { steps }, missing }
+}
+
+fn unexplained(step: usize, mention: &Mention) -> Missing {
+    let word = &mention.surface;
+    let reason = if mention.pronoun {
+        format!("nothing was named before that {word:?} could mean, and the robot holds nothing")
+    } else {
+        format!("there is no {word} here")
+    };
+    Missing::Meaning { step, reason }
+}

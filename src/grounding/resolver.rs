@@ -1,0 +1,37 @@
+use crate::language::{Mention, Symbol};
+use crate::world::Domain;
+
+/// What the mentions of a clause may mean.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Referents {
+    /// Per mention the types it may mean, best first; empty for a pronoun that nothing explains.
+    pub types: Vec<Vec<Symbol>>,
+    /// What was named last, here or before.
+    pub last: Option<Symbol>,
+}
+
+/// Entity resolution by scene (paper, section 3.1.1; DESIGN, decision 8): a name means the type
+/// with the closest instance, a pronoun what the robot holds, else what was named last.
+///
+/// - `before`: what was named last before this clause.
+pub fn resolve<D: Domain>(
+    domain: &D,
+    scene: &D::Scene,
+    mentions: &[Mention],
+    before: Option<&Symbol>,
+) -> Referents {
+    let held = domain.held(scene);
+    let mut referents = Referents { types: Vec::new(), last: before.cloned() };
+    for mention in mentions {
+        let types = if mention.pronoun {
+            held.clone().or_else(|| referents.last.clone()).into_iter().collect()
+        } else {
+            domain.resolve(scene, mention)
+        };
+        if let Some(best) = types.first() {
+            referents.last = Some(best.clone());
+        }
+        referents.types.push(types);
+    }
+    referents
+}

@@ -1,0 +1,47 @@
+use serde::{Deserialize, Serialize};
+
+use super::parsing::ParserWeights;
+use super::{Report, TrainError};
+use crate::grounding::RerankerWeights;
+use crate::ids::Digest;
+use crate::language::Exemplar;
+
+/// A mind as it is stored: a MessagePack map with field names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bundle {
+    pub version: u16,
+    pub recipe: Digest,
+    /// How many of the exemplars, from the first, are seeds.
+    pub seeds: u32,
+    pub exemplars: Vec<Exemplar>,
+    pub parser: ParserWeights,
+    pub reranker: Option<RerankerWeights>,
+    pub report: Report,
+}
+
+impl Bundle {
+    /// Goes up when the form changes; a mind of another version is trained again.
+    pub const VERSION: u16 = 1;
+}
+
+pub fn encode(bundle: &Bundle) -> Vec<u8> {
+    rmp_serde::to_vec_named(bundle).expect("a bundle is plain data, which MessagePack can hold")
+}
+
+/// - errors: bytes that are no bundle, or of another version.
+pub fn decode(bytes: &[u8]) -> Result<Bundle, TrainError> {
+    #[derive(Deserialize)]
+    struct Versioned {
+        version: u16,
+    }
+    let Versioned { version } = rmp_serde::from_slice(bytes).map_err(TrainError::unreadable)?;
+    if version != Bundle::VERSION {
+        let reason = format!(
+            "it has version {version}, this binary reads version {}; train it again",
+            Bundle::VERSION
+        );
+        return Err(TrainError::Unreadable { reason });
+    }
+    rmp_serde::from_slice(bytes).map_err(TrainError::unreadable)
+}

@@ -1,0 +1,86 @@
+use super::{Lesson, Recipe};
+use crate::grounding::{Abstractor, resolve, without_locations};
+use crate::language::{Clause, Exemplar, LiftedArg, LiftedProgram, LiftedStep, Program, Symbol};
+use crate::world::Domain;
+
+/// What a lesson becomes for the parser: its utterance and its program, both lifted (paper,
+/// section 3.2).
+///
+/// An argument that a mention meant becomes that mention's slot; where a name may mean several
+/// types, it meant the one that the program acts on. All other arguments stay what they were:
+/// "wash the mug" keeps its `SinkBasin`. With [`super::recipe::Lifting::held`], what was in the
+/// hand when the utterance was said and was not mentioned becomes `<held>`.
+pub fn lift<D: Domain>(
+    domain: &D,
+    recipe: &Recipe,
+    lesson: &Lesson<D::Scene, D::Task>,
+) -> Exemplar {
+    let settings = recipe.settings();
+    let known = |word: &str| recipe.words().lookup(word).is_some();
+    let abstractor = Abstractor::new(domain.lexicon(), &settings.abstraction, &known);
+    let whole = abstractor.read(&lesson.utterance).whole();
+    let lifted = lift_clause(domain, recipe, lesson, &whole);
+    // "from the <obj>" goes only when the program does not need it: then the place was no argument.
+    let shorter = settings.abstraction.locations.then(|| without_locations(&whole)).flatten();
+    let shorter = shorter.map(|clause| (lift_clause(domain, recipe, lesson, &clause), clause));
+    match shorter {
+        Some((short, clause)) if slots_used(&short) == slots_used(&lifted) => {
+            Exemplar { utterance: clause.lifted, program: short }
+        }
+        _ => Exemplar { utterance: whole.lifted, program: lifted },
+    }
+}
+
+fn lift_clause<D: Domain>(
+    domain: &D,
+    recipe: &Recipe,
+    lesson: &Lesson<D::Scene, D::Task>,
+    clause: &Clause,
+) -> LiftedProgram {
+    let before = lesson.mentioned.as_ref();
+    let referents = resolve(domain, &lesson.scene, &clause.mentions, before);
+    let acts_on = |kind: &&Symbol| lesson.program.steps.iter().any(|s| s.args.contains(kind));
+    let meant: Vec<Option<&Symbol>> = referents
+        .types
+        .iter()
+        .zip(&clause.mentions)
+        // A name may also mean a type that was not in sight when it was said.
+        .map(|(types, said)| types.iter().chain(&said.types).find(acts_on).or(types.first()))
+        .collect();
+    let held = domain.held(&lesson.scene).filter(|_| recipe.settings().lifting.held);
+    let lift_arg = |arg: &Symbol| {
+        // Of two mentions of one type, the first is it: "the mug on the table beside the mug".
+        match meant.iter().position(|kind| *kind == Some(arg)) {
+            Some(place) => LiftedArg::Slot {
+                sort: clause.mentions[place].sort.clone(),
+                number: place as u8 + 1,
+            },
+            None if held.as_ref() == Some(arg) => LiftedArg::Held,
+            None => LiftedArg::Constant(arg.clone()),
+        }
+    };
+    lift_program(&lesson.program, lift_arg)
+}
+
+fn lift_program(program: &Program, lift_arg: impl Fn(&Symbol) -> LiftedArg) -> LiftedProgram {
+    let steps = program.steps.iter().map(|step| LiftedStep {
+        operator: step.operator.clone(),
+        args: step.args.iter().map(&lift_arg).collect(),
+    });
+    LiftedProgram { steps: steps.collect() }
+}
+
+fn slots_used(program: &LiftedProgram) -> usize {
+    let mut numbers: Vec<u8> = program
+        .steps
+        .iter()
+        .flat_map(|step| &step.args)
+        .filter_map(|arg| match arg {
+            LiftedArg::Slot { number, .. } => Some(*number),
+            _ => None,
+        })
+        .collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers.len()
+}

@@ -1,0 +1,114 @@
+use super::history::history;
+use super::lift::lift;
+use super::parsing::AnyParser;
+use super::{Lesson, Mind, Recipe, Report, TrainError};
+use crate::grounding::Reranker;
+use crate::ids::Digest;
+use crate::language::{Clause, Exemplar, Symbol};
+use crate::limits::LESSONS_MAX;
+use crate::parser::SemanticParser;
+use crate::world::Domain;
+
+/// Trains a mind: seeds and lifted lessons to exemplars, the parser on them, its threshold; then
+/// the whole history is parsed again and the reranker learns from it (paper, section 3.3).
+///
+/// A pure function: the training seed derives from the recipe's digest alone, so the same recipe
+/// and lessons give the same mind, bit for bit, on every machine. Without lessons it is the base
+/// mind, which everybody starts with.
+///
+/// - errors: too many lessons, a training that diverges, or a seed that no longer gets its own
+///   program. The previous mind is then the one to keep.
+pub fn train<D: Domain>(
+    domain: &D,
+    recipe: &Recipe,
+    lessons: &[Lesson<D::Scene, D::Task>],
+) -> Result<Mind, TrainError> {
+    if lessons.len() > LESSONS_MAX {
+        return Err(TrainError::TooManyLessons { found: lessons.len() });
+    }
+    let seeds = domain.seeds();
+    let mut exemplars = seeds.exemplars.clone();
+    exemplars.extend(lessons.iter().map(|lesson| lift(domain, recipe, lesson)));
+
+    let (parser, figures) = AnyParser::train(recipe, seed(recipe, "parser"), &exemplars, seeds)?;
+    seeds_keep_their_programs(&parser, &seeds.exemplars, lessons)?;
+    let report =
+        Report { exemplars: exemplars.len() as u32, threshold: parser.threshold(), figures };
+    let seed_count = seeds.exemplars.len() as u32;
+    let mut mind = Mind::new(recipe.clone(), parser, None, seed_count, report);
+    if lessons.is_empty() {
+        return Ok(mind);
+    }
+
+    let history = history(domain, &mind, lessons, seed(recipe, "history"));
+    let (reranker, figures) = Reranker::train(
+        &recipe.settings().reranker,
+        recipe.words(),
+        symbols(domain, &exemplars),
+        domain.feature_count(),
+        seed(recipe, "reranker"),
+        &history,
+    );
+    let named = [
+        ("reranker_choices", figures.choices as f64),
+        ("reranker_loss", figures.loss as f64),
+        ("reranker_right", reranker.share_right(&history)),
+        ("reranker_steps", figures.steps as f64),
+    ];
+    let mut report = mind.report.clone();
+    report.figures.extend(named.map(|(name, value)| (name.to_owned(), value)));
+    mind = Mind::new(recipe.clone(), mind.parser, Some(reranker), seed_count, report);
+    Ok(mind)
+}
+
+/// The seed of one part of a training.
+fn seed(recipe: &Recipe, part: &str) -> Digest {
+    let mut hasher = blake3::Hasher::new_derive_key("apprentice 2026 training seed");
+    hasher.update(&recipe.digest().0);
+    hasher.update(part.as_bytes());
+    Digest(*hasher.finalize().as_bytes())
+}
+
+/// Everything that programs may consist of.
+fn symbols<D: Domain>(domain: &D, exemplars: &[Exemplar]) -> Vec<Symbol> {
+    let operators = domain.signature().operators.iter().map(|operator| operator.name.clone());
+    let meanings = domain.lexicon().names.values().flatten();
+    let kinds = meanings.map(|meaning| meaning.kind.clone());
+    let args = exemplars.iter().flat_map(|exemplar| &exemplar.program.steps).flat_map(|s| &s.args);
+    let constants = args.filter_map(|arg| match arg {
+        crate::language::LiftedArg::Constant(symbol) => Some(symbol.clone()),
+        _ => None,
+    });
+    operators.chain(kinds).chain(constants).collect()
+}
+
+/// What everybody can say from the first day must not be lost to a lesson.
+fn seeds_keep_their_programs<S, T>(
+    parser: &AnyParser,
+    seeds: &[Exemplar],
+    lessons: &[Lesson<S, T>],
+) -> Result<(), TrainError> {
+    for seed in seeds {
+        let parse = parser.parse(&Clause::of(&seed.utterance));
+        let Some(first) = parse.candidates.first() else {
+            return Err(TrainError::SeedUnheard {
+                seed: seed.utterance.to_string(),
+                threshold: parse.threshold.to_string(),
+            });
+        };
+        if first.program != seed.program {
+            let number = first.number as usize;
+            let swallower = match number.checked_sub(seeds.len()).and_then(|i| lessons.get(i)) {
+                Some(lesson) => format!("the lesson {:?}", lesson.utterance.as_str()),
+                None => format!("the seed {:?}", parser.exemplars()[number].utterance.to_string()),
+            };
+            return Err(TrainError::SeedLost {
+                seed: seed.utterance.to_string(),
+                program: seed.program.to_string(),
+                found: first.program.to_string(),
+                swallower,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,93 @@
+use serde::{Deserialize, Serialize};
+
+use super::{Floats, Rng, Shape, Sink, gemm, gemm_transposed_a, glorot, transpose};
+
+/// `y = x·W + b`. Parameters lie flat: `W` row-major `[inputs × outputs]`, then `b` `[outputs]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Linear {
+    pub inputs: usize,
+    pub outputs: usize,
+    pub parameters: Floats,
+}
+
+/// Room that [`Linear::backward`] works in; keep one per training, so that steps do not allocate.
+#[derive(Debug, Clone, Default)]
+pub struct LinearScratch {
+    transposed: Vec<f32>,
+}
+
+impl Linear {
+    /// Glorot weights, zero bias.
+    pub fn new(inputs: usize, outputs: usize, rng: &mut Rng) -> Linear {
+        let mut parameters = Floats::zeros(inputs * outputs + outputs);
+        glorot(inputs, outputs, &mut parameters[..inputs * outputs], rng);
+        Linear { inputs, outputs, parameters }
+    }
+
+    pub fn weights(&self) -> &[f32] {
+        &self.parameters[..self.inputs * self.outputs]
+    }
+
+    pub fn bias(&self) -> &[f32] {
+        &self.parameters[self.inputs * self.outputs..]
+    }
+
+    /// Whether the parameters are as many as the sizes say; to be asked of what was read back.
+    pub fn is_whole(&self) -> bool {
+        self.inputs
+            .checked_add(1)
+            .and_then(|rows| rows.checked_mul(self.outputs))
+            .is_some_and(|count| count == self.parameters.len())
+    }
+
+    /// - `x`: `[rows × inputs]`; `y`: `[rows × outputs]`, overwritten.
+    pub fn forward(&self, rows: usize, x: &[f32], y: &mut [f32]) {
+        for row in y.chunks_exact_mut(self.outputs) {
+            row.copy_from_slice(self.bias());
+        }
+        gemm(self.shape(rows), x, self.weights(), y, Sink::Add);
+    }
+
+    /// Adds the gradient of the parameters to `gradient` (laid out as `parameters`) and, when asked
+    /// for, overwrites `dx` `[rows × inputs]` with the gradient of `x`.
+    ///
+    /// - `x`: what `forward` was given; `dy`: `[rows × outputs]`, the gradient of its result.
+    pub fn backward(
+        &self,
+        rows: usize,
+        x: &[f32],
+        dy: &[f32],
+        gradient: &mut [f32],
+        dx: Option<&mut [f32]>,
+        scratch: &mut LinearScratch,
+    ) {
+        let (inputs, outputs) = (self.inputs, self.outputs);
+        let (weights, bias) = gradient.split_at_mut(inputs * outputs);
+        let shape = Shape { rows: inputs, inner: rows, columns: outputs };
+        gemm_transposed_a(shape, x, dy, weights, Sink::Add);
+        for row in dy.chunks_exact(outputs) {
+            bias.iter_mut().zip(row).for_each(|(sum, d)| *sum += d);
+        }
+        if let Some(dx) = dx {
+            transpose(inputs, outputs, self.weights(), &mut scratch.transposed);
+            let shape = Shape { rows, inner: outputs, columns: inputs };
+            gemm(shape, dy, &scratch.transposed, dx, Sink::Replace);
+        }
+    }
+
+    fn shape(&self, rows: usize) -> Shape {
+        Shape { rows, inner: self.inputs, columns: self.outputs }
+    }
+}
+
+/// max(x, 0) in place.
+pub fn relu(x: &mut [f32]) {
+    x.iter_mut().for_each(|x| *x = if *x > 0.0 { *x } else { 0.0 });
+}
+
+/// Stops the gradient where [`relu`] gave 0; `y` is its result.
+pub fn relu_backward(y: &[f32], dy: &mut [f32]) {
+    for (d, &y) in dy.iter_mut().zip(y) {
+        *d = if y > 0.0 { *d } else { 0.0 };
+    }
+}

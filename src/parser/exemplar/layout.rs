@@ -1,0 +1,71 @@
+use std::ops::Range;
+
+/// Where each part of the learned parameters lies in their one flat list, so that one optimiser
+/// steps them all and a digest covers them all.
+///
+/// In order: `transform` `[dims × hidden]`, its bias `[hidden]`; the first layer of the MLP
+/// `[hidden × hidden]`, its bias; the second `[hidden × embedding]`, its bias; a vector of `[dims]`
+/// for each sort; the classifier's a and b.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub dims: usize,
+    pub hidden: usize,
+    pub embedding: usize,
+    pub sorts: usize,
+}
+
+impl Layout {
+    fn sizes(&self) -> [usize; 8] {
+        let Layout { dims, hidden, embedding, sorts } = *self;
+        [
+            dims * hidden,
+            hidden,
+            hidden * hidden,
+            hidden,
+            hidden * embedding,
+            embedding,
+            sorts * dims,
+            2,
+        ]
+    }
+
+    fn part(&self, index: usize) -> Range<usize> {
+        let sizes = self.sizes();
+        let start = sizes[..index].iter().sum();
+        start..start + sizes[index]
+    }
+
+    pub fn transform(&self) -> Range<usize> {
+        self.part(0)
+    }
+    pub fn transform_bias(&self) -> Range<usize> {
+        self.part(1)
+    }
+    pub fn first(&self) -> Range<usize> {
+        self.part(2)
+    }
+    pub fn first_bias(&self) -> Range<usize> {
+        self.part(3)
+    }
+    pub fn second(&self) -> Range<usize> {
+        self.part(4)
+    }
+    pub fn second_bias(&self) -> Range<usize> {
+        self.part(5)
+    }
+    pub fn sorts(&self) -> Range<usize> {
+        self.part(6)
+    }
+    pub fn sort(&self, sort: usize) -> Range<usize> {
+        let start = self.sorts().start + sort * self.dims;
+        start..start + self.dims
+    }
+    /// The places of a and b.
+    pub fn classifier(&self) -> [usize; 2] {
+        let start = self.part(7).start;
+        [start, start + 1]
+    }
+    pub fn total(&self) -> usize {
+        self.sizes().iter().sum()
+    }
+}

@@ -1,0 +1,170 @@
+//! The one place that wires a service together: store → actors → gateway. The binary starts it,
+//! and so does any program that wants the service inside itself (`examples/embed.rs`).
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use crate::actors::{ActorsError, Failure, House, HouseSettings};
+use crate::frontends::{
+    Client, ClientError, Context, Counts, Endpoint, EndpointError, Gateway, GatewayError,
+};
+use crate::ids::{TenantId, UserId};
+use crate::learning::Recipe;
+use crate::limits::AWAKE_USERS_MAX;
+use crate::store;
+use crate::world::Domain;
+
+/// What a service is made of.
+#[derive(Debug, Clone)]
+pub struct Config<D: Domain> {
+    pub domain: Arc<D>,
+    pub data: Data,
+    /// The recipe (TOML) that new people start with. People who are known keep theirs.
+    pub recipe_text: String,
+    /// Endpoints beside the one inside the process: `tcp://127.0.0.1:PORT` (0 takes a free port),
+    /// `tcp://[::1]:PORT`, `ipc://PATH`.
+    pub listen: Vec<String>,
+    /// Trainings at once.
+    pub trainers: usize,
+    /// People awake at once.
+    pub awake_max: usize,
+}
+
+/// Where a service keeps what it records.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Data {
+    Directory(PathBuf),
+    /// Nowhere: everything ends with the service. For tests and trials.
+    Memory,
+}
+
+/// Why a service did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+    #[error(transparent)]
+    Store(#[from] store::OpenError),
+    #[error(transparent)]
+    Actors(#[from] ActorsError),
+    #[error(transparent)]
+    Gateway(#[from] GatewayError),
+}
+
+/// A running service. Stops when dropped.
+pub struct Service {
+    // Dropped, and stopped, in this order: first nobody comes in, then everybody goes to sleep.
+    gateway: Gateway,
+    house: House,
+    context: Context,
+    failure: Failure,
+}
+
+/// The endpoint inside the process; each service has a context, so that names do not meet.
+const INNER: &str = "inproc://apprentice";
+
+impl<D: Domain> Config<D> {
+    /// The `default` recipe, no endpoint, as many trainers and actor threads as fit this machine.
+    pub fn new(domain: Arc<D>, data: Data) -> Config<D> {
+        let recipe = Recipe::builtin("default").expect("the recipe `default` ships");
+        Config {
+            domain,
+            data,
+            recipe_text: recipe.to_owned(),
+            listen: Vec::new(),
+            trainers: cores(),
+            awake_max: AWAKE_USERS_MAX,
+        }
+    }
+}
+
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, |cores| cores.get())
+}
+
+impl Service {
+    /// Opens the store, trains the base mind, and opens the doors, in this order: nobody is
+    /// answered by a service that is not ready.
+    pub fn start<D: Domain>(config: Config<D>) -> Result<Service, StartError> {
+        let outer = config.listen.iter().map(|text| Endpoint::parse(text));
+        let outer: Vec<Endpoint> = outer.collect::<Result<_, _>>()?;
+        let failure = Failure::default();
+        let store = match &config.data {
+            Data::Directory(path) => store::open(path)?,
+            Data::Memory => store::open_memory(),
+        };
+        let house = House::start(HouseSettings {
+            domain: config.domain,
+            store,
+            recipe_text: config.recipe_text,
+            trainers: config.trainers,
+            arbiters: cores(),
+            awake_max: config.awake_max,
+            failure: failure.clone(),
+        })?;
+        let context = Context::new();
+        let (tenant, front) = (TenantId::local(), house.front());
+        let gateway = Gateway::open(&context, INNER, &outer, tenant, front, failure.clone())?;
+        Ok(Service { gateway, house, context, failure })
+    }
+
+    /// A client inside this process.
+    pub fn connect(&self, user: UserId) -> Result<Client, ClientError> {
+        Client::within(&self.context, INNER, user)
+    }
+
+    /// The first endpoint that other processes can reach, with the port that was taken.
+    pub fn endpoint(&self) -> Option<&str> {
+        self.endpoints().first().map(String::as_str)
+    }
+
+    pub fn endpoints(&self) -> &[String] {
+        self.gateway.endpoints()
+    }
+
+    /// What came through the doors.
+    pub fn counts(&self) -> Counts {
+        self.gateway.counters().now()
+    }
+
+    /// People awake now.
+    pub fn awake(&self) -> usize {
+        self.house.awake()
+    }
+
+    /// Why the service cannot go on, if so: it then answers nobody, and whoever started it must
+    /// end the process with a code that is not 0.
+    pub fn failed(&self) -> Option<String> {
+        self.failure.reason()
+    }
+
+    /// Blocks until the service failed or `limit` has passed.
+    pub fn wait_for_failure(&self, limit: Duration) -> Option<String> {
+        self.failure.wait(limit);
+        self.failed()
+    }
+
+    /// Takes no more requests, answers those in hand, sends everybody to sleep and closes the
+    /// store. When this returns the data directory may be opened again.
+    ///
+    /// - errors: the reason, when the service had failed before.
+    pub fn stop(mut self) -> Result<(), String> {
+        let reason = self.failed();
+        self.close();
+        reason.map_or(Ok(()), Err)
+    }
+
+    fn close(&mut self) {
+        self.failure.stop_expected();
+        self.gateway.close();
+        self.house.stop();
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        self.close();
+    }
+}

@@ -1,0 +1,260 @@
+//! What an event does to the state. Total and pure: it reads the event and the state, runs the
+//! recorded program in the world, and nothing else. It can not refuse the past; it can only report
+//! that binary and log disagree.
+
+use std::sync::Arc;
+
+use super::Phase;
+use super::state::{Action, Episode, LiveLesson, Opened, State, Training, Unexplained};
+use crate::events::{
+    DecompositionTaught, EpisodeStarted, Event, Head, Interpreted, Record, RetrainCompleted,
+    SessionOpened,
+};
+use crate::ids::Seq;
+use crate::language::Outcome;
+use crate::learning::Lesson;
+use crate::world::Domain;
+
+/// Binary and log disagree about the past. Loud, and never healed silently.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("record {seq}: {field} is recorded as {recorded}, this binary computes {recomputed}")]
+pub struct Divergence {
+    pub seq: Seq,
+    pub field: &'static str,
+    pub recorded: String,
+    pub recomputed: String,
+}
+
+/// Applies one record to the state.
+///
+/// - errors: [`Divergence`]; the state is then not to be used any more.
+pub fn apply<D: Domain>(
+    domain: &D,
+    state: &mut State<D::Scene, D::Task>,
+    record: &Record,
+) -> Result<(), Divergence> {
+    let seq = record.seq;
+    agree(seq, "sequence number", seq.get(), state.head.seq + 1)?;
+    agree(seq, "predecessor", record.prev, state.head.digest)?;
+    match &record.event {
+        Event::SessionOpened(event) => open(domain, state, seq, event)?,
+        Event::EpisodeStarted(event) => start(domain, state, seq, event)?,
+        Event::Interpreted(event) => interpret(domain, state, seq, event)?,
+        Event::EpisodeEnded(event) => {
+            state.phase = if event.to_teach.is_empty() { Phase::Idle } else { Phase::Teaching };
+        }
+        Event::DecompositionTaught(event) => teach(state, seq, event)?,
+        Event::DecompositionDeclined(event) => {
+            unexplained(state, seq, event.explains)?.settled = true;
+        }
+        Event::LessonForgotten(event) => forget(state, seq, event.lesson)?,
+        Event::RetrainScheduled(event) => {
+            let training = Training { recipe: event.recipe, lessons: event.lessons.clone() };
+            let live: Vec<Seq> = state.lessons.iter().map(|live| live.seq).collect();
+            agree(seq, "live lessons", seqs(&event.lessons), seqs(&live))?;
+            state.training = Some(training);
+            state.phase = Phase::Learning;
+        }
+        Event::RetrainCompleted(event) => complete(state, seq, event)?,
+        Event::RetrainFailed(_) => {
+            state.training = None;
+            state.phase = Phase::Idle;
+        }
+        Event::SessionClosed(_) => {
+            state.training = None;
+            state.phase = Phase::Closed;
+        }
+    }
+    state.head = Head { seq: seq.get(), digest: record.digest }.into();
+    state.last_at = record.at;
+    state.requests.note(record.request, seq);
+    Ok(())
+}
+
+fn open<D: Domain>(
+    domain: &D,
+    state: &mut State<D::Scene, D::Task>,
+    seq: Seq,
+    event: &SessionOpened,
+) -> Result<(), Divergence> {
+    agree(seq, "domain", event.domain.as_str(), domain.id())?;
+    agree(seq, "domain version", event.domain_version, domain.version())?;
+    state.opened = Some(Opened {
+        user: event.user.clone(),
+        domain: event.domain.clone(),
+        domain_version: event.domain_version,
+        recipe: event.recipe.clone(),
+        recipe_text: event.recipe_text.clone(),
+        recipe_digest: event.recipe_digest,
+    });
+    state.mind = Some(event.mind);
+    Ok(())
+}
+
+fn start<D: Domain>(
+    domain: &D,
+    state: &mut State<D::Scene, D::Task>,
+    seq: Seq,
+    event: &EpisodeStarted,
+) -> Result<(), Divergence> {
+    let unreadable = |field, reason: String| Divergence {
+        seq,
+        field,
+        recorded: "a document".to_owned(),
+        recomputed: format!("nothing: {reason}"),
+    };
+    let scene: D::Scene = event.scene.decode().map_err(|reason| unreadable("scene", reason))?;
+    let task: D::Task = event.task.decode().map_err(|reason| unreadable("task", reason))?;
+    agree(seq, "scene digest", event.scene_digest, domain.digest(&scene))?;
+    state.episode = Some(Episode {
+        scene: Arc::new(scene),
+        task: Arc::new(task),
+        goal: event.goal.clone(),
+        fewest: event.fewest,
+        mentioned: None,
+        utterances: 0,
+        actions: Vec::new(),
+        unexplained: Vec::new(),
+    });
+    state.episodes += 1;
+    state.phase = Phase::Interacting;
+    Ok(())
+}
+
+fn interpret<D: Domain>(
+    domain: &D,
+    state: &mut State<D::Scene, D::Task>,
+    seq: Seq,
+    event: &Interpreted,
+) -> Result<(), Divergence> {
+    let episode = state.episode.as_mut().ok_or_else(|| outside(seq, "an episode"))?;
+    agree(seq, "actions before", event.actions_before as usize, episode.actions.len())?;
+    episode.utterances += 1;
+    match &event.answer.outcome {
+        Outcome::Understood { program, bindings } => {
+            let mut scene = D::Scene::clone(&episode.scene);
+            for (index, step) in program.steps.iter().enumerate() {
+                let bound =
+                    domain.step(&mut scene, &episode.task, step).map_err(|error| Divergence {
+                        seq,
+                        field: "a carried-out step",
+                        recorded: step.to_string(),
+                        recomputed: format!("infeasible: {error}"),
+                    })?;
+                let recorded = bindings.get(index).cloned().unwrap_or_default();
+                agree(seq, "binding", recorded.join(", "), bound.join(", "))?;
+                episode.actions.push(Action { step: step.clone(), binding: bound });
+            }
+            episode.scene = Arc::new(scene);
+        }
+        outcome @ (Outcome::Impossible { .. } | Outcome::NotSure) => {
+            episode.unexplained.push(Unexplained {
+                seq,
+                utterance: event.utterance.clone(),
+                not_sure: matches!(outcome, Outcome::NotSure),
+                actions_before: event.actions_before,
+                scene: episode.scene.clone(),
+                mentioned: episode.mentioned.clone(),
+                settled: false,
+            });
+        }
+    }
+    if event.answer.mentioned.is_some() {
+        episode.mentioned = event.answer.mentioned.clone();
+    }
+    agree(seq, "scene digest", event.scene_after, domain.digest(&episode.scene))
+}
+
+fn teach<S, T>(
+    state: &mut State<S, T>,
+    seq: Seq,
+    event: &DecompositionTaught,
+) -> Result<(), Divergence> {
+    let said = unexplained(state, seq, event.explains)?;
+    said.settled = true;
+    let (scene, mentioned) = (said.scene.clone(), said.mentioned.clone());
+    let episode = state.episode.as_ref().ok_or_else(|| outside(seq, "an episode"))?;
+    let lesson = Lesson {
+        utterance: event.utterance.clone(),
+        program: event.program.clone(),
+        scene,
+        task: episode.task.clone(),
+        mentioned,
+    };
+    state.lessons.push(LiveLesson { seq, lesson });
+    Ok(())
+}
+
+fn forget<S, T>(state: &mut State<S, T>, seq: Seq, lesson: Seq) -> Result<(), Divergence> {
+    let place = state.lessons.iter().position(|live| live.seq == lesson);
+    let place = place.ok_or_else(|| Divergence {
+        seq,
+        field: "forgotten lesson",
+        recorded: format!("record {lesson}"),
+        recomputed: "no such live lesson".to_owned(),
+    })?;
+    let gone = state.lessons.remove(place);
+    if state.trained.contains(&lesson) {
+        state.retired.push(gone);
+    }
+    Ok(())
+}
+
+fn complete<S, T>(
+    state: &mut State<S, T>,
+    seq: Seq,
+    event: &RetrainCompleted,
+) -> Result<(), Divergence> {
+    let training = state.training.take().ok_or_else(|| outside(seq, "a training"))?;
+    agree(seq, "recipe", event.recipe, training.recipe)?;
+    state.mind = Some(event.mind);
+    state.trained = training.lessons;
+    state.retired.clear();
+    state.phase = Phase::Idle;
+    Ok(())
+}
+
+fn unexplained<S, T>(
+    state: &mut State<S, T>,
+    seq: Seq,
+    explains: Seq,
+) -> Result<&mut Unexplained<S>, Divergence> {
+    let episode = state.episode.as_mut().ok_or_else(|| outside(seq, "an episode"))?;
+    let found = episode.unexplained.iter_mut().find(|said| said.seq == explains);
+    found.ok_or_else(|| Divergence {
+        seq,
+        field: "explained utterance",
+        recorded: format!("record {explains}"),
+        recomputed: "no such utterance in this episode".to_owned(),
+    })
+}
+
+fn outside(seq: Seq, what: &str) -> Divergence {
+    Divergence {
+        seq,
+        field: "place in history",
+        recorded: format!("within {what}"),
+        recomputed: format!("outside {what}"),
+    }
+}
+
+fn agree<A: PartialEq<B> + ToString, B: ToString>(
+    seq: Seq,
+    field: &'static str,
+    recorded: A,
+    recomputed: B,
+) -> Result<(), Divergence> {
+    match recorded == recomputed {
+        true => Ok(()),
+        false => Err(Divergence {
+            seq,
+            field,
+            recorded: recorded.to_string(),
+            recomputed: recomputed.to_string(),
+        }),
+    }
+}
+
+fn seqs(list: &[Seq]) -> String {
+    list.iter().map(Seq::to_string).collect::<Vec<_>>().join(", ")
+}

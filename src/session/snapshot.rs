@@ -1,0 +1,23 @@
+//! A state as bytes, for its digest, and a session that goes on from a state.
+
+use std::sync::Arc;
+
+use super::state::State;
+use super::{Session, parse_recipe};
+use crate::ids::Digest;
+use crate::world::Domain;
+
+impl<D: Domain> Session<D> {
+    /// Goes on from a state that `apply` made; the mind is to be [installed](Session::install)
+    /// afterwards.
+    pub fn resume(domain: Arc<D>, state: State<D::Scene, D::Task>) -> Session<D> {
+        let recipe = parse_recipe(&state);
+        Session { domain, state, recipe, mind: None }
+    }
+
+    /// BLAKE3 over the state as MessagePack with field names: equal states have equal digests.
+    pub fn state_digest(&self) -> Digest {
+        let bytes = rmp_serde::to_vec_named(&self.state);
+        Digest::of(&bytes.expect("a state is plain data and encodes into memory"))
+    }
+}

@@ -1,0 +1,162 @@
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::Phase;
+use crate::events::Head;
+use crate::ids::{Digest, RequestId, Seq, Timestamp, UserId};
+use crate::language::{Step, Symbol, Utterance};
+use crate::learning::Lesson;
+use crate::limits::REQUEST_RING;
+
+/// Everything a person's history has led to. Made by `apply` alone; `S` and `T` are the domain's
+/// scene and task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct State<S, T> {
+    pub head: HeadFields,
+    pub last_at: Timestamp,
+    pub phase: Phase,
+    pub opened: Option<Opened>,
+    pub episodes: u32,
+    /// The present episode, or the last one while there is none.
+    pub episode: Option<Episode<S, T>>,
+    /// Lessons that were not taken back, in the order they were taught.
+    pub lessons: Vec<LiveLesson<S, T>>,
+    /// Lessons that were taken back while the present mind still knows them: needed should that
+    /// mind have to be trained again.
+    pub retired: Vec<LiveLesson<S, T>>,
+    /// The mind that answers now.
+    pub mind: Option<Digest>,
+    /// The lessons that mind was trained on.
+    pub trained: Vec<Seq>,
+    /// A training that is scheduled and neither completed nor failed.
+    pub training: Option<Training>,
+    pub requests: RequestRing,
+}
+
+/// [`Head`] in a form that can be stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HeadFields {
+    pub seq: u64,
+    pub digest: Digest,
+}
+
+impl From<Head> for HeadFields {
+    fn from(head: Head) -> HeadFields {
+        HeadFields { seq: head.seq, digest: head.digest }
+    }
+}
+
+impl From<HeadFields> for Head {
+    fn from(head: HeadFields) -> Head {
+        Head { seq: head.seq, digest: head.digest }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Opened {
+    pub user: UserId,
+    pub domain: String,
+    pub domain_version: u16,
+    pub recipe: String,
+    pub recipe_text: String,
+    pub recipe_digest: Digest,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Episode<S, T> {
+    pub scene: Arc<S>,
+    pub task: Arc<T>,
+    pub goal: String,
+    pub fewest: Option<u32>,
+    /// The type named last.
+    pub mentioned: Option<Symbol>,
+    pub utterances: u32,
+    pub actions: Vec<Action>,
+    /// The utterances that were not carried out, in the order they were said.
+    pub unexplained: Vec<Unexplained<S>>,
+}
+
+/// A primitive that was carried out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Action {
+    pub step: Step,
+    pub binding: Vec<String>,
+}
+
+/// An utterance that was not carried out, with all that a lesson made of it would need.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained<S> {
+    pub seq: Seq,
+    pub utterance: Utterance,
+    pub not_sure: bool,
+    pub actions_before: u32,
+    pub scene: Arc<S>,
+    pub mentioned: Option<Symbol>,
+    /// Whether it was taught or declined since.
+    pub settled: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LiveLesson<S, T> {
+    /// Its `DecompositionTaught` event.
+    pub seq: Seq,
+    pub lesson: Lesson<S, T>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Training {
+    pub recipe: Digest,
+    pub lessons: Vec<Seq>,
+}
+
+impl<S, T> Default for State<S, T> {
+    fn default() -> Self {
+        State {
+            head: Head::EMPTY.into(),
+            last_at: Timestamp::default(),
+            phase: Phase::Idle,
+            opened: None,
+            episodes: 0,
+            episode: None,
+            lessons: Vec::new(),
+            retired: Vec::new(),
+            mind: None,
+            trained: Vec::new(),
+            training: None,
+            requests: RequestRing::default(),
+        }
+    }
+}
+
+/// The last [`REQUEST_RING`] request ids and the records each of them led to: longer than any
+/// client's retry window (invariant `ExactlyOnce`).
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct RequestRing(VecDeque<Answered>);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Answered {
+    pub request: RequestId,
+    pub first: Seq,
+    pub last: Seq,
+}
+
+impl RequestRing {
+    pub fn find(&self, request: RequestId) -> Option<Answered> {
+        self.0.iter().rev().find(|answered| answered.request == request).copied()
+    }
+
+    /// Notes that `request` led to the record `seq`; the records of one request follow each other.
+    pub fn note(&mut self, request: RequestId, seq: Seq) {
+        match self.0.back_mut() {
+            Some(answered) if answered.request == request => answered.last = seq,
+            _ => {
+                if self.0.len() == REQUEST_RING {
+                    self.0.pop_front();
+                }
+                self.0.push_back(Answered { request, first: seq, last: seq });
+            }
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Questions that change nothing and are never recorded.
+
+use super::state::Episode;
+use super::{ActionView, KnownExemplar, Session, Status, Teachable};
+use crate::world::{Domain, View};
+
+impl<D: Domain> Session<D> {
+    /// What the robot sees and holds; none before the first episode.
+    pub fn look(&self) -> Option<View> {
+        let episode = self.state.episode.as_ref()?;
+        Some(self.domain.look(&episode.scene))
+    }
+
+    /// The exemplars of the present mind, seeds first.
+    pub fn known(&self) -> Vec<KnownExemplar> {
+        let exemplars = self.mind.as_ref().map(|mind| mind.exemplars()).unwrap_or_default();
+        let known = exemplars.into_iter().map(|(exemplar, lesson)| KnownExemplar {
+            exemplar,
+            lesson: lesson.and_then(|index| self.state.trained.get(index).copied()),
+        });
+        known.collect()
+    }
+
+    /// - panics: before the session was opened.
+    pub fn status(&self) -> Status {
+        let (state, episode) = (&self.state, self.state.episode.as_ref());
+        Status {
+            phase: state.phase,
+            seq: state.head.seq,
+            episodes: state.episodes,
+            recipe: self.recipe().name().to_owned(),
+            mind: self.mind_digest(),
+            exemplars: (self.domain.seeds().exemplars.len() + state.trained.len()) as u32,
+            lessons: state.lessons.len() as u32,
+            goal: episode.map(|episode| episode.goal.clone()),
+            progress: episode
+                .map(|episode| self.domain.progress(&episode.scene, &episode.task))
+                .unwrap_or_default(),
+            utterances: episode.map_or(0, |episode| episode.utterances),
+            actions: episode.map(|episode| self.actions(episode)).unwrap_or_default(),
+            to_teach: match state.phase {
+                super::Phase::Teaching => episode.map(to_teach).unwrap_or_default(),
+                _ => Vec::new(),
+            },
+        }
+    }
+
+    fn actions(&self, episode: &Episode<D::Scene, D::Task>) -> Vec<ActionView> {
+        let numbered = episode.actions.iter().zip(1..);
+        numbered
+            .map(|(action, number)| ActionView {
+                number,
+                step: action.step.to_string(),
+                sentence: self.domain.narrate(&action.step, &action.binding),
+            })
+            .collect()
+    }
+}
+
+fn to_teach<S, T>(episode: &Episode<S, T>) -> Vec<Teachable> {
+    let open = episode.unexplained.iter().filter(|said| !said.settled);
+    open.map(|said| Teachable {
+        seq: said.seq,
+        utterance: said.utterance.to_string(),
+        actions_before: said.actions_before,
+        not_sure: said.not_sure,
+    })
+    .collect()
+}

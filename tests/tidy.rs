@@ -1,0 +1,342 @@
+//! The map must be the territory: the two tables of `ARCHITECTURE.md` are read from that file and
+//! every `use` in `src/` is held against them. A change to a table is a design change.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
+    let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() {
+            rust_files(&path, out);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+/// Every source file with its path below `src/`, comments and string contents blanked out.
+fn sources() -> Vec<(String, String)> {
+    let src = root().join("src");
+    let mut files = Vec::new();
+    rust_files(&src, &mut files);
+    let relative = |path: &PathBuf| path.strip_prefix(&src).unwrap().display().to_string();
+    files.iter().map(|path| (relative(path), strip(&read(path)))).collect()
+}
+
+/// Blanks line comments, block comments and string literals, so that words in them do not count.
+fn strip(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '/' if chars.peek() == Some(&'/') => {
+                while chars.peek().is_some_and(|&next| next != '\n') {
+                    chars.next();
+                }
+            }
+            '/' if chars.peek() == Some(&'*') => {
+                let mut last = ' ';
+                for next in chars.by_ref() {
+                    if last == '*' && next == '/' {
+                        break;
+                    }
+                    last = next;
+                }
+            }
+            '"' => {
+                let mut escaped = false;
+                for next in chars.by_ref() {
+                    match next {
+                        '\\' if !escaped => escaped = true,
+                        '"' if !escaped => break,
+                        _ => escaped = false,
+                    }
+                }
+                out.push_str("\"\"");
+            }
+            // A quote character must not open a string.
+            '\'' => {
+                out.push('\'');
+                let mut ahead = chars.clone();
+                if (ahead.next(), ahead.next()) == (Some('"'), Some('\'')) {
+                    chars.next();
+                }
+            }
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// The rows of the table in `ARCHITECTURE.md` whose header's first cell is `head`: from each name
+/// in backquotes of the first cell to the text of the second.
+fn table(head: &str) -> BTreeMap<String, String> {
+    let map = read(&root().join("ARCHITECTURE.md"));
+    let cells = |line: &str| -> Vec<String> {
+        line.trim().trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
+    };
+    let mut lines = map.lines().skip_while(|line| !line.starts_with(&format!("| {head}")));
+    assert!(lines.next().is_some(), "ARCHITECTURE.md has no table whose header begins with {head}");
+    let mut rows = BTreeMap::new();
+    for line in lines.skip(1).take_while(|line| line.starts_with('|')) {
+        let cells = cells(line);
+        for name in quoted(&cells[0]) {
+            rows.insert(name, cells[1].clone());
+        }
+    }
+    assert!(!rows.is_empty(), "the table {head} in ARCHITECTURE.md is empty");
+    rows
+}
+
+fn quoted(text: &str) -> Vec<String> {
+    text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// The room a file belongs to: its folder below `src/`, or its own name.
+fn room(file: &str) -> &str {
+    file.split(['/', '.']).next().unwrap()
+}
+
+/// The rooms that a source text names as `crate::room`, nested imports included.
+fn rooms_named(text: &str) -> BTreeSet<String> {
+    let name = |rest: &str| -> String {
+        rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+    };
+    let mut found = BTreeSet::new();
+    for (place, _) in text.match_indices("crate::") {
+        if text[..place].ends_with('$') {
+            continue;
+        }
+        let rest = &text[place + "crate::".len()..];
+        match rest.strip_prefix('{') {
+            Some(list) => {
+                let mut depth = 0;
+                let mut start = true;
+                for (index, c) in list.char_indices() {
+                    match c {
+                        '{' => depth += 1,
+                        '}' if depth == 0 => break,
+                        '}' => depth -= 1,
+                        ',' if depth == 0 => start = true,
+                        c if start && depth == 0 && (c.is_alphanumeric() || c == '_') => {
+                            found.insert(name(&list[index..]));
+                            start = false;
+                        }
+                        _ => {}
+                    }
+                }
+            }
+            None => {
+                found.insert(name(rest));
+            }
+        }
+    }
+    found.retain(|name| !name.is_empty());
+    found
+}
+
+#[test]
+fn rooms_import_only_what_the_map_allows() {
+    let walls = table("room");
+    let shared = ["ids", "limits", "invariants"];
+    let mut wrong = Vec::new();
+    for (file, text) in sources() {
+        let here = room(&file).to_owned();
+        if file == "lib.rs" || shared.contains(&here.as_str()) {
+            continue;
+        }
+        // `main.rs` sees the library from outside.
+        let text = if file == "main.rs" { text.replace("apprentice::", "crate::") } else { text };
+        let allowed = walls
+            .get(&here)
+            .unwrap_or_else(|| panic!("{file}: the room `{here}` has no row in ARCHITECTURE.md"));
+        if allowed == "everything" {
+            continue;
+        }
+        let allowed = quoted(allowed);
+        for named in rooms_named(&text) {
+            let fine = named == here
+                || shared.contains(&named.as_str())
+                || allowed.contains(&named)
+                || !walls.contains_key(&named);
+            if !fine {
+                wrong.push(format!("src/{file} imports `{named}`, which `{here}` may not"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn packages_appear_only_where_the_map_allows() {
+    let packages = table("package");
+    let rooms: BTreeSet<String> = table("room").into_keys().collect();
+    let mut wrong = Vec::new();
+    for (package, allowed) in &packages {
+        let allowed = quoted(allowed);
+        for place in &allowed {
+            let exists = root().join("src").join(place).exists();
+            assert!(exists || rooms.contains(place), "the package table names src/{place}");
+        }
+        let needle = format!("{}::", package.replace('-', "_"));
+        for (file, text) in sources() {
+            let used = text.match_indices(&needle).any(|(place, _)| {
+                let before = text[..place].chars().next_back();
+                !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':')
+            });
+            let fine = allowed.iter().any(|place| {
+                file == *place || room(&file) == place || file.starts_with(&format!("{place}/"))
+            });
+            if used && !fine {
+                wrong.push(format!("src/{file} uses `{package}`, which the map keeps elsewhere"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_dependency_stands_in_the_map_or_the_list_with_its_reason() {
+    let manifest: toml::Table = read(&root().join("Cargo.toml")).parse().unwrap();
+    let reasons = read(&root().join("docs/dependencies.md"));
+    for section in ["dependencies", "dev-dependencies"] {
+        for name in manifest[section].as_table().unwrap().keys() {
+            let row = format!("| `{name}` |");
+            assert!(reasons.contains(&row), "docs/dependencies.md has no line for `{name}`");
+        }
+    }
+}
+
+#[test]
+fn every_room_and_every_link_of_the_map_exists() {
+    let map = read(&root().join("ARCHITECTURE.md"));
+    for (file, _) in sources() {
+        let here = room(&file);
+        if here != "lib" {
+            assert!(map.contains(&format!("`{here}")), "ARCHITECTURE.md does not name `{here}`");
+        }
+    }
+    for name in table("room").into_keys() {
+        let src = root().join("src");
+        let exists = src.join(&name).is_dir() || src.join(format!("{name}.rs")).is_file();
+        assert!(exists, "ARCHITECTURE.md describes src/{name}, which does not exist");
+    }
+}
+
+#[test]
+fn links_between_pages_lead_somewhere() {
+    let mut pages = vec![];
+    for folder in ["", "docs", "docs/adr", "deploy", "schema"] {
+        let Ok(entries) = fs::read_dir(root().join(folder)) else { continue };
+        let paths = entries.map(|entry| entry.unwrap().path());
+        pages.extend(paths.filter(|path| path.extension().is_some_and(|e| e == "md")));
+    }
+    assert!(pages.len() > 5, "found only {} pages", pages.len());
+    let mut dead = Vec::new();
+    for page in pages {
+        for piece in read(&page).split("](").skip(1) {
+            let target = piece.split([')', '#', ' ']).next().unwrap();
+            if target.is_empty() || target.contains("://") {
+                continue;
+            }
+            if !page.parent().unwrap().join(target).exists() {
+                dead.push(format!("{} links to {target}", page.display()));
+            }
+        }
+    }
+    assert!(dead.is_empty(), "{}", dead.join("\n"));
+}
+
+#[test]
+fn only_the_store_gives_receipts() {
+    for (file, text) in sources() {
+        let fine = room(&file) == "store" || file == "events/receipt.rs";
+        assert!(fine || !text.contains("Durable::mint"), "src/{file} mints a receipt");
+    }
+}
+
+#[test]
+fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
+    let core = [
+        "language",
+        "numerics",
+        "events",
+        "world",
+        "parser",
+        "grounding",
+        "learning",
+        "session",
+        "ids",
+        "limits",
+        "invariants",
+    ];
+    let banned = [
+        "std::time",
+        "std::fs",
+        "std::net",
+        "std::env",
+        "std::thread",
+        "std::process",
+        "HashMap",
+        "HashSet",
+        "SystemTime",
+        "Instant",
+        "getrandom",
+        "mul_add",
+        "par_iter",
+        "rayon",
+        "general_mat_mul",
+        ".exp()",
+        ".ln()",
+        ".tanh()",
+        ".sin()",
+        ".cos()",
+        ".powf(",
+        ".exp2()",
+    ];
+    let mut wrong = Vec::new();
+    for (file, text) in sources() {
+        if !core.contains(&room(&file)) {
+            continue;
+        }
+        let product = text.split("#[cfg(test)]").next().unwrap();
+        wrong.extend(
+            banned
+                .iter()
+                .filter(|word| product.contains(**word))
+                .map(|word| format!("src/{file} uses {word}")),
+        );
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn nothing_is_left_undone_in_the_code() {
+    let unfinished = ["todo!(", "unimplemented!(", "dbg!("];
+    for (file, text) in sources() {
+        for word in unfinished {
+            assert!(!text.contains(word), "src/{file} has {word}…)");
+        }
+    }
+}
+
+#[test]
+fn the_checks_of_this_file_can_fail() {
+    assert_eq!(
+        rooms_named("use crate::{ids::Digest, world::{Domain, Stage}}; crate::store::open()"),
+        ["ids", "store", "world"].map(str::to_owned).into()
+    );
+    assert_eq!(strip("a // crate::x\n\"crate::y\" b"), "a \n\"\" b");
+}

@@ -1,0 +1,67 @@
+//! What the tests need from the machine, installed when it is missing.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The workspace's folder.
+pub fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().expect("xtask lies in the workspace").to_owned()
+}
+
+/// Whether a program answers to these arguments.
+pub fn answers(program: &str, arguments: &[&str]) -> bool {
+    let mut command = Command::new(program);
+    command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+/// Runs a command in the workspace's folder.
+///
+/// - errors: a sentence with the command line and how it ended.
+pub fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
+    let line = format!("{program} {}", arguments.join(" "));
+    let status = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .status()
+        .map_err(|error| format!("cannot run `{line}`: {error}"))?;
+    match status.success() {
+        true => Ok(()),
+        false => Err(format!("`{line}` failed: {status}")),
+    }
+}
+
+/// A Python with the packages of the wire's example, in `target/python`.
+pub fn python() -> Result<PathBuf, String> {
+    let folder = root().join("target/python");
+    let python = folder.join("bin/python");
+    let path = python.display().to_string();
+    if answers(&path, &["-c", "import zmq, msgpack"]) {
+        return Ok(python);
+    }
+    let made = run("python3", &["-m", "venv", &folder.display().to_string()]);
+    if made.is_err() {
+        debian("python3-venv", || answers("python3", &["-c", "import ensurepip"]))?;
+        run("python3", &["-m", "venv", &folder.display().to_string()])?;
+    }
+    run(&path, &["-m", "pip", "install", "--quiet", "pyzmq==27.1.0", "msgpack==1.1.2"])?;
+    Ok(python)
+}
+
+/// Installs a Debian package unless `present` says that it is there.
+pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
+    if present() {
+        return Ok(());
+    }
+    run("apt-get", &["update", "--quiet"])?;
+    run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", package])
+}
+
+/// Installs the licence checker unless it is there.
+pub fn cargo_deny() -> Result<(), String> {
+    if answers("cargo", &["deny", "--version"]) {
+        return Ok(());
+    }
+    run("cargo", &["install", "cargo-deny", "--version", "0.20.2", "--locked", "--quiet"])
+}

@@ -1,0 +1,74 @@
+//! The stages of `cargo xtask test`, in order, each timed against its budget.
+
+use std::time::Instant;
+
+use crate::budget::Budget;
+use crate::machine::{self, run};
+
+struct Stage {
+    name: &'static str,
+    act: fn() -> Result<(), String>,
+}
+
+const STAGES: &[Stage] = &[
+    Stage { name: "format", act: || run("cargo", &["fmt", "--all", "--check"]) },
+    Stage { name: "lint", act: lint },
+    Stage { name: "build", act: build },
+    Stage { name: "test", act: test },
+    Stage { name: "docs", act: docs },
+    Stage { name: "licences", act: licences },
+];
+
+/// Runs the stages, or those named, and prints what each took.
+///
+/// - errors: the first stage that failed or exceeded its budget.
+pub fn run_all(only: &[String]) -> Result<(), String> {
+    let known: Vec<&str> = STAGES.iter().map(|stage| stage.name).collect();
+    if let Some(unknown) = only.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(format!("there is no stage {unknown}; known are {}", known.join(", ")));
+    }
+    let budget = Budget::load()?;
+    let mut took = Vec::new();
+    for stage in STAGES.iter().filter(|s| only.is_empty() || only.iter().any(|n| n == s.name)) {
+        eprintln!("== {}", stage.name);
+        let start = Instant::now();
+        (stage.act)()?;
+        let seconds = start.elapsed().as_secs();
+        took.push(format!("{:<10} {seconds:>5} s", stage.name));
+        budget.check(stage.name, seconds)?;
+    }
+    println!("{}", took.join("\n"));
+    Ok(())
+}
+
+fn lint() -> Result<(), String> {
+    run("cargo", &["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])
+}
+
+fn build() -> Result<(), String> {
+    run("cargo", &["build", "--release", "--quiet"])?;
+    run("cargo", &["test", "--workspace", "--no-run", "--quiet"])
+}
+
+fn test() -> Result<(), String> {
+    machine::python()?;
+    run("cargo", &["test", "--workspace"])
+}
+
+fn docs() -> Result<(), String> {
+    run("cargo", &["doc", "--workspace", "--no-deps", "--quiet"])
+}
+
+/// Advisories need a database that not every machine can reach: by hand, see `deny.toml`.
+fn licences() -> Result<(), String> {
+    machine::cargo_deny()?;
+    run("cargo", &["deny", "check", "licenses", "bans", "sources"])
+}
+
+/// Runs the benchmarks.
+pub fn bench(filter: Option<&str>) -> Result<(), String> {
+    let mut arguments = vec!["bench"];
+    arguments.extend(["--"].iter().filter(|_| filter.is_some()));
+    arguments.extend(filter);
+    run("cargo", &arguments)
+}
