@@ -199,20 +199,31 @@ impl<D: Domain> Ground<'_, D> {
             }
             let refused = |reason| ((before + index) as u32, reason);
             domain.signature().check(step).map_err(refused)?;
-            let done = domain.step(scene, task, step).or_else(|refusal| {
-                let first = refusal.first.as_ref().filter(|_| self.execution.approach);
-                let Some(first) = first else { return Err(refusal) };
-                let bound = domain.step(scene, task, first)?;
-                steps.push(first.clone());
+            let mut unasked = 0;
+            let bound = loop {
+                let refusal = match domain.step(scene, task, step) {
+                    Ok(bound) => break bound,
+                    Err(refusal) => refusal,
+                };
+                // What is in the fridge across the room takes two: going there and opening it.
+                let first = refusal.first.filter(|_| self.execution.approach);
+                let Some(first) = first.filter(|_| unasked < UNASKED_STEPS_MAX) else {
+                    return Err(refused(refusal.reason));
+                };
+                let bound = domain.step(scene, task, &first).map_err(|e| refused(e.reason))?;
+                steps.push(first);
                 bindings.push(bound);
-                domain.step(scene, task, step)
-            });
-            bindings.push(done.map_err(|refusal| refused(refusal.reason))?);
+                unasked += 1;
+            };
+            bindings.push(bound);
             steps.push(step.clone());
         }
         Ok(())
     }
 }
+
+/// Steps taken unasked before one step that needs them.
+const UNASKED_STEPS_MAX: usize = 3;
 
 /// Which types the mentions are tried with: first the best of each; then, one mention at a time,
 /// the others that share its name ("cup" when only the mug can be picked up).

@@ -22,15 +22,15 @@ static FORCED: AtomicU8 = AtomicU8::new(0);
 impl Kernel {
     /// The kernels this machine can run, slowest first.
     pub fn available() -> Vec<Kernel> {
-        let mut kernels = vec![Kernel::Plain];
+        let all = [Kernel::Plain, Kernel::Sse2, Kernel::Avx2];
+        all.into_iter().filter(|kernel| kernel.runs_here()).collect()
+    }
+
+    fn runs_here(self) -> bool {
         #[cfg(target_arch = "x86_64")]
-        {
-            kernels.push(Kernel::Sse2);
-            if std::arch::is_x86_feature_detected!("avx2") {
-                kernels.push(Kernel::Avx2);
-            }
-        }
-        kernels
+        return self != Kernel::Avx2 || std::arch::is_x86_feature_detected!("avx2");
+        #[cfg(not(target_arch = "x86_64"))]
+        return self == Kernel::Plain;
     }
 
     /// Makes every later call in this process use `kernel` (`None`: the fastest again). For tests
@@ -39,7 +39,7 @@ impl Kernel {
     /// - panics: this machine cannot run `kernel`.
     pub fn force(kernel: Option<Kernel>) {
         if let Some(kernel) = kernel {
-            assert!(Kernel::available().contains(&kernel), "no {kernel:?} on this machine");
+            assert!(kernel.runs_here(), "no {kernel:?} on this machine");
         }
         FORCED.store(kernel.map_or(0, |kernel| kernel as u8), Ordering::Relaxed);
     }
@@ -65,17 +65,9 @@ impl Kernel {
         }
     }
 
-    #[cfg(target_arch = "x86_64")]
     fn fastest() -> Kernel {
-        match std::arch::is_x86_feature_detected!("avx2") {
-            true => Kernel::Avx2,
-            false => Kernel::Sse2,
-        }
-    }
-
-    #[cfg(not(target_arch = "x86_64"))]
-    fn fastest() -> Kernel {
-        Kernel::Plain
+        let fastest_first = [Kernel::Avx2, Kernel::Sse2];
+        fastest_first.into_iter().find(|kernel| kernel.runs_here()).unwrap_or(Kernel::Plain)
     }
 }
 

@@ -18,6 +18,8 @@ pub struct WordTable {
     entries: Vec<i8>,
     /// The mean length of a vector; hashed vectors of unknown words get it too.
     typical_norm: f32,
+    /// The frequency of the rarest word.
+    rarest: f32,
     digest: Digest,
 }
 
@@ -96,9 +98,18 @@ impl WordTable {
             return Err(WordTableError::Long { extra: rest.rest.len() });
         }
         let digest = Digest::of(bytes);
-        let typical_norm = 0.0;
-        let mut table =
-            WordTable { dims, ends, text, scales, frequencies, entries, typical_norm, digest };
+        let rarest = frequencies.iter().copied().fold(1.0, f32::min);
+        let mut table = WordTable {
+            dims,
+            ends,
+            text,
+            scales,
+            frequencies,
+            entries,
+            typical_norm: 0.0,
+            rarest,
+            digest,
+        };
         table.check_values()?;
         table.typical_norm = table.mean_norm();
         Ok(table)
@@ -192,7 +203,7 @@ impl WordTable {
     pub fn frequency(&self, word: &str) -> f32 {
         match self.lookup(word) {
             Some(index) => self.frequencies[index],
-            None => self.frequencies.iter().copied().fold(1.0, f32::min),
+            None => self.rarest,
         }
     }
 

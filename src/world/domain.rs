@@ -120,8 +120,8 @@ pub enum StageError {
 #[error("{reason}")]
 pub struct Infeasible {
     pub reason: String,
-    /// The step that would have to come first, where one step is all that is missing: going to
-    /// what is out of reach. Recipes may take it unasked.
+    /// The step that would have to come first, where one step is what is missing: going to what is
+    /// out of reach, opening what is shut. Recipes may take it unasked.
     pub first: Option<Step>,
 }
 

@@ -151,8 +151,9 @@ impl ExemplarParser {
         self.encoder.embed(&self.weights.parameters, &rows)
     }
 
-    /// The exemplars of exactly this form, oldest first.
-    fn exact(&self, lifted: &LiftedUtterance) -> &[u32] {
+    /// The exemplars of exactly this lifted form, oldest first. More than one means that they may
+    /// disagree; the oldest is then the answer.
+    pub fn exact(&self, lifted: &LiftedUtterance) -> &[u32] {
         let form = |number: &u32| &self.exemplars[*number as usize].utterance;
         let start = self.by_form.partition_point(|number| form(number) < lifted);
         let count = self.by_form[start..].partition_point(|number| form(number) == lifted);

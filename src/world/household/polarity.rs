@@ -1,0 +1,43 @@
+use super::primitives::{Action, Bound, act};
+use super::scene::{Scene, State};
+use super::task::Task;
+use crate::language::Program;
+
+/// Whether the words ask to turn on what is on, or off what is off. TOGGLE itself has no
+/// direction (the paper's primitive), so only the words can contradict the scene; and only when
+/// the program is that one TOGGLE, since one that toggles twice means both.
+pub(super) fn contradiction(
+    scene: &Scene,
+    words: &[String],
+    program: &Program,
+) -> Option<(usize, String)> {
+    let [step] = &program.steps[..] else { return None };
+    let action @ Action::Toggle(_) = Action::read(step).ok()? else { return None };
+    let wanted = wanted(words)?;
+    let Bound::One(index) = act(&mut scene.clone(), &Task::free(), action).ok()? else {
+        return None;
+    };
+    if scene.object(index).is(State::On) != wanted {
+        return None;
+    }
+    let state = if wanted { "on" } else { "off" };
+    Some((0, format!("the {} is already {state}", scene.name(index))))
+}
+
+/// `true` for on, `false` for off, nothing when the words do not say.
+///
+/// "off" decides wherever it stands ("turn the lamp on the desk off"); "on" alone may be about a
+/// place ("toggle the lamp on the desk") and counts only beside a verb that takes it.
+fn wanted(words: &[String]) -> Option<bool> {
+    const TAKE_ON: [&str; 10] =
+        ["turn", "turns", "turning", "switch", "power", "flip", "click", "put", "get", "flick"];
+    const MEAN_ON: [&str; 5] = ["activate", "start", "illuminate", "ignite", "enable"];
+    const MEAN_OFF: [&str; 6] = ["off", "deactivate", "stop", "extinguish", "disable", "unlight"];
+    let any = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    let (on, off) = (any(&["on"]) && any(&TAKE_ON) || any(&MEAN_ON), any(&MEAN_OFF));
+    match (on, off) {
+        (_, true) => Some(false),
+        (true, false) => Some(true),
+        (false, false) => None,
+    }
+}

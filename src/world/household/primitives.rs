@@ -1,0 +1,263 @@
+use super::facts::{Kind, facts};
+use super::refusal::Refusal;
+use super::scene::{Index, Scene, State};
+use super::task::Task;
+use super::task_goal::at_goal;
+use crate::language::Step;
+
+/// One of the six primitives with the kinds it names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Action {
+    Goto(Kind),
+    Pickup(Kind),
+    Put(Kind, Kind),
+    Open(Kind),
+    Close(Kind),
+    Toggle(Kind),
+}
+
+/// The instances an action was carried out with, one per argument.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bound {
+    One(Index),
+    Two(Index, Index),
+}
+
+impl Action {
+    /// - errors: a sentence, when an argument is no kind of the household. The operator and the
+    ///   number of arguments were checked against the signature.
+    pub fn read(step: &Step) -> Result<Action, String> {
+        let kind = |index: usize| match step.args.get(index) {
+            Some(name) => facts().find(name.as_str()),
+            None => Err(format!("{step} lacks an argument")),
+        };
+        match step.operator.as_str() {
+            "GOTO" => Ok(Action::Goto(kind(0)?)),
+            "PICKUP" => Ok(Action::Pickup(kind(0)?)),
+            "PUT" => Ok(Action::Put(kind(0)?, kind(1)?)),
+            "OPEN" => Ok(Action::Open(kind(0)?)),
+            "CLOSE" => Ok(Action::Close(kind(0)?)),
+            "TOGGLE" => Ok(Action::Toggle(kind(0)?)),
+            other => Err(format!("there is no primitive {other}")),
+        }
+    }
+
+    pub fn step(self) -> Step {
+        let (operator, kinds) = match self {
+            Action::Goto(kind) => ("GOTO", vec![kind]),
+            Action::Pickup(kind) => ("PICKUP", vec![kind]),
+            Action::Put(thing, place) => ("PUT", vec![thing, place]),
+            Action::Open(kind) => ("OPEN", vec![kind]),
+            Action::Close(kind) => ("CLOSE", vec![kind]),
+            Action::Toggle(kind) => ("TOGGLE", vec![kind]),
+        };
+        let args = kinds.into_iter().map(|kind| kind.symbol().clone()).collect();
+        Step { operator: operator.into(), args }
+    }
+}
+
+/// Carries out one action, bound to the nearest instances for which it can run.
+///
+/// - errors: [`Refusal`]; the scene is then unchanged.
+pub(super) fn act(scene: &mut Scene, task: &Task, action: Action) -> Result<Bound, Refusal> {
+    match action {
+        Action::Goto(kind) => goto(scene, task, kind),
+        Action::Pickup(kind) => pickup(scene, task, kind),
+        Action::Put(thing, place) => put(scene, thing, place),
+        Action::Open(kind) => open(scene, kind),
+        Action::Close(kind) => close(scene, kind),
+        Action::Toggle(kind) => toggle(scene, kind),
+    }
+}
+
+fn goto(scene: &mut Scene, task: &Task, kind: Kind) -> Result<Bound, Refusal> {
+    let carried = |scene: &Scene, index| match Some(scene.root(index)) == scene.robot.holds {
+        true => Err(Refusal::InHand(index)),
+        false => Ok(()),
+    };
+    let target = bind(scene, kind, Some(task), carried)?;
+    let root = scene.root(target);
+    (scene.robot.x, scene.robot.y) = scene.place(root);
+    scene.robot.at = Some(root);
+    Ok(Bound::One(target))
+}
+
+fn pickup(scene: &mut Scene, task: &Task, kind: Kind) -> Result<Bound, Refusal> {
+    if scene.of(kind).next().is_none() {
+        return Err(Refusal::NoneHere(kind));
+    }
+    if !kind.pickupable() {
+        return Err(Refusal::NotPickupable(kind));
+    }
+    if let Some(held) = scene.robot.holds {
+        let same = scene.object(held).kind == kind;
+        return Err(if same { Refusal::InHand(held) } else { Refusal::HandFull(held) });
+    }
+    let target = bind(scene, kind, Some(task), reachable)?;
+    if scene.robot.at == Some(target) {
+        scene.robot.at = None;
+    }
+    scene.robot.holds = Some(target);
+    scene.object_mut(target).parent = None;
+    move_with_contents(scene, target, (0, 0));
+    Ok(Bound::One(target))
+}
+
+fn put(scene: &mut Scene, thing: Kind, place: Kind) -> Result<Bound, Refusal> {
+    let held = match scene.robot.holds {
+        Some(held) if scene.object(held).kind == thing => held,
+        _ if scene.of(thing).next().is_none() => return Err(Refusal::NoneHere(thing)),
+        _ => return Err(Refusal::NotHeld(thing)),
+    };
+    if scene.of(place).next().is_none() {
+        return Err(Refusal::NoneHere(place));
+    }
+    if !place.receptacle() {
+        return Err(Refusal::NoReceptacle(place));
+    }
+    if !place.may_hold(thing) {
+        return Err(Refusal::DoesNotGo(thing, place));
+    }
+    let target = bind(scene, place, None, |scene, index| {
+        if scene.root(index) == held {
+            return Err(Refusal::IntoItself(held));
+        }
+        reachable(scene, index)?;
+        match scene.object(index).shut() {
+            true => Err(Refusal::Shut(index)),
+            false => Ok(()),
+        }
+    })?;
+    scene.robot.holds = None;
+    scene.object_mut(held).parent = Some(target);
+    let spot = spot_on(scene, target, held);
+    move_with_contents(scene, held, spot);
+    scene.settle();
+    Ok(Bound::Two(held, target))
+}
+
+fn open(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
+    if scene.of(kind).next().is_some() && !kind.openable() {
+        return Err(Refusal::NotOpenable(kind));
+    }
+    let target = bind(scene, kind, None, |scene, index| {
+        reachable(scene, index)?;
+        let object = scene.object(index);
+        match (object.shut(), object.is(State::On)) {
+            (false, _) => Err(Refusal::AlreadyOpen(index)),
+            // A laptop may run with its lid down; only what works behind its door keeps it shut.
+            (true, true) if kind.receptacle() => Err(Refusal::Running(index)),
+            (true, _) => Ok(()),
+        }
+    })?;
+    scene.object_mut(target).set(State::Open, true);
+    Ok(Bound::One(target))
+}
+
+fn close(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
+    if scene.of(kind).next().is_some() && !kind.openable() {
+        return Err(Refusal::NotOpenable(kind));
+    }
+    let target = bind(scene, kind, None, |scene, index| {
+        reachable(scene, index)?;
+        match scene.object(index).shut() {
+            true => Err(Refusal::AlreadyClosed(index)),
+            false => Ok(()),
+        }
+    })?;
+    scene.object_mut(target).set(State::Open, false);
+    scene.settle();
+    Ok(Bound::One(target))
+}
+
+fn toggle(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
+    if scene.of(kind).next().is_some() && !kind.toggleable() {
+        return Err(Refusal::NotToggleable(kind));
+    }
+    let target = bind(scene, kind, None, |scene, index| {
+        reachable(scene, index)?;
+        let object = scene.object(index);
+        match kind.has_door() && !object.shut() && !object.is(State::On) {
+            true => Err(Refusal::DoorOpen(index)),
+            false => Ok(()),
+        }
+    })?;
+    let on = scene.object(target).is(State::On);
+    scene.object_mut(target).set(State::On, !on);
+    scene.settle();
+    Ok(Bound::One(target))
+}
+
+fn reachable(scene: &Scene, index: Index) -> Result<(), Refusal> {
+    if !scene.in_reach(index) {
+        return Err(Refusal::OutOfReach(index));
+    }
+    match scene.shut_in(index) {
+        Some(around) => Err(Refusal::ShutIn(index, around)),
+        None => Ok(()),
+    }
+}
+
+/// What decides between instances, smallest first; the distance comes last.
+type Order = (bool, bool, (i64, i64));
+
+/// The nearest thing of `kind` that `can` be used. With a task (for walking and picking up), what
+/// is not yet at its goal comes before what is, and what is in sight before what is shut away;
+/// ties go to the earlier thing.
+///
+/// - errors: why the nearest of the others cannot be used; what is in reach comes first, since its
+///   reason says more than "out of reach".
+fn bind(
+    scene: &Scene,
+    kind: Kind,
+    task: Option<&Task>,
+    can: impl Fn(&Scene, Index) -> Result<(), Refusal>,
+) -> Result<Index, Refusal> {
+    let mut best: Option<(Order, Index)> = None;
+    let mut reason: Option<(Order, Refusal)> = None;
+    for index in scene.of(kind) {
+        match can(scene, index) {
+            Ok(()) => {
+                let done = task.is_some_and(|task| at_goal(scene, task, index));
+                let away = task.is_some() && scene.shut_in(index).is_some();
+                let key = (done, away, scene.distance(index));
+                if best.is_none_or(|(known, _)| key < known) {
+                    best = Some((key, index));
+                }
+            }
+            Err(refusal) => {
+                let away = scene.shut_in(index).is_some();
+                let key = (!scene.in_reach(index), away, scene.distance(index));
+                if reason.is_none_or(|(known, _)| key < known) {
+                    reason = Some((key, refusal));
+                }
+            }
+        }
+    }
+    match (best, reason) {
+        (Some((_, index)), _) => Ok(index),
+        (None, Some((_, refusal))) => Err(refusal),
+        (None, None) => Err(Refusal::NoneHere(kind)),
+    }
+}
+
+/// A place on or in a receptacle that depends on nothing but which thing it is, so that putting
+/// things down in another order leads to the same scene, and so does a scene without the rest.
+pub(super) fn spot_on(scene: &Scene, receptacle: Index, thing: Index) -> (i16, i16) {
+    let (x, y) = scene.place(receptacle);
+    let kind = scene.object(thing).kind;
+    let earlier = scene.of(kind).take_while(|&index| index < thing).count() as i16;
+    let number = (i16::from(kind.0) + 11 * earlier) % 35;
+    let (column, row) = (number % 7 - 3, number / 7 - 2);
+    let inside = |centre: i16, offset: i16| centre.saturating_add(offset).max(0);
+    (inside(x, column * 8), inside(y, row * 8))
+}
+
+fn move_with_contents(scene: &mut Scene, moved: Index, place: (i16, i16)) {
+    for index in 0..scene.objects.len() as Index {
+        if index == moved || scene.ancestors(index).any(|around| around == moved) {
+            let object = scene.object_mut(index);
+            (object.x, object.y) = place;
+        }
+    }
+}

@@ -1,0 +1,49 @@
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use super::{Household, run};
+use crate::language::{Document, Step};
+use crate::world::{Domain, Stage};
+
+/// Prints figures; asserts nothing about time, which depends on who else uses the machine.
+#[test]
+fn digest_step_and_planner_figures() {
+    let household = Household::new();
+    let (scene, task) =
+        household.stage(&Stage::Task { task: "cool Apple DiningTable".into(), seed: 3 }).unwrap();
+    let each = |name: &str, times: u32, work: &mut dyn FnMut()| {
+        let start = Instant::now();
+        (0..times).for_each(|_| work());
+        println!("{name}: {:?}", start.elapsed() / times);
+    };
+    println!("{} things", scene.objects.len());
+    each("digest", 10_000, &mut || {
+        black_box(household.digest(black_box(&scene)));
+    });
+    each("clone", 10_000, &mut || {
+        black_box(black_box(&scene).clone());
+    });
+    let step: Step = "GOTO Apple".parse().unwrap();
+    each("clone and step", 10_000, &mut || {
+        let mut after = scene.clone();
+        black_box(household.step(&mut after, &task, &step)).unwrap();
+    });
+    let program = household.plan(&scene, &task).unwrap();
+    each("features", 1_000, &mut || {
+        black_box(household.features(&scene, &program));
+    });
+    let (mut total, mut worst) = (Duration::ZERO, (Duration::ZERO, String::new()));
+    for seed in 0..100 {
+        let (scene, task) = household.stage(&Stage::Seed { seed }).unwrap();
+        let start = Instant::now();
+        black_box(household.plan(&scene, &task));
+        let took = start.elapsed();
+        total += took;
+        worst = worst.max((took, format!("seed {seed}: {task}")));
+    }
+    println!("plan: {:?} on average, {worst:?} at worst", total / 100);
+    let bytes = Document::of(&scene).as_json().to_string().len();
+    println!("document: {bytes} bytes");
+    let mut scene = scene;
+    run(&household, &mut scene, &task, &program.to_string()).unwrap();
+}

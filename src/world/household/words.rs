@@ -1,0 +1,103 @@
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::facts::{embedded, facts};
+use crate::language::{Exemplar, LiftedUtterance, Symbol};
+use crate::world::{Lexicon, Meaning, SeedSet};
+
+/// The sort of every argument: a household has one.
+pub(super) const SORT: &str = "obj";
+
+#[derive(Deserialize)]
+struct Words {
+    pronouns: Vec<String>,
+    adjectives: Vec<String>,
+    plurals: BTreeMap<String, String>,
+    fixtures: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+struct Seeds {
+    exemplars: Vec<(String, String)>,
+    variants: Vec<(String, String)>,
+    unknown: Vec<String>,
+}
+
+/// What things are called, from `names.toml` and `words.toml`.
+pub(super) fn lexicon() -> Lexicon {
+    let names: BTreeMap<String, BTreeMap<String, u32>> =
+        embedded("names.toml", include_str!("../../../data/household/names.toml"));
+    let words: Words = embedded("words.toml", include_str!("../../../data/household/words.toml"));
+    let known = |name: &str| facts().kind(name).expect("tables name only kinds of types.toml");
+    let meanings = |meant: BTreeMap<String, u32>| {
+        let meaning = |(kind, count): (String, u32)| Meaning {
+            sort: Symbol::new(SORT),
+            kind: known(&kind).symbol().clone(),
+            count,
+        };
+        let mut all: Vec<Meaning> = meant.into_iter().map(meaning).collect();
+        all.sort_by(|a, b| b.count.cmp(&a.count).then_with(|| a.kind.cmp(&b.kind)));
+        all
+    };
+    Lexicon {
+        names: names.into_iter().map(|(name, meant)| (name, meanings(meant))).collect(),
+        plurals: words.plurals,
+        pronouns: words.pronouns,
+        adjectives: words.adjectives,
+        fixtures: words
+            .fixtures
+            .into_iter()
+            .map(|(kind, word)| (known(&kind).symbol().clone(), word))
+            .collect(),
+    }
+}
+
+/// What every user starts with, from `seeds.toml`.
+pub(super) fn seeds() -> SeedSet {
+    let seeds: Seeds = embedded("seeds.toml", include_str!("../../../data/household/seeds.toml"));
+    let exemplar = |(utterance, program): (String, String)| Exemplar {
+        utterance: LiftedUtterance::parse(&utterance),
+        program: program.parse().expect("seeds.toml writes lifted programs"),
+    };
+    SeedSet {
+        exemplars: seeds.exemplars.into_iter().map(exemplar).collect(),
+        variants: seeds.variants.into_iter().map(exemplar).collect(),
+        unknown: seeds.unknown.iter().map(|text| LiftedUtterance::parse(text)).collect(),
+    }
+}
+
+/// The word of `known` with the fewest edits from `word`, whatever the case; the first of equals.
+pub(super) fn nearest_word<'a>(
+    word: &str,
+    known: impl Iterator<Item = &'a str>,
+) -> Option<&'a str> {
+    // A request may carry kilobytes where a name belongs; its start is enough to suggest by.
+    let word: String = word.chars().take(40).collect::<String>().to_lowercase();
+    known.min_by_key(|candidate| edits(&word, &candidate.to_lowercase()))
+}
+
+/// Insertions, deletions and replacements from one word to the other.
+fn edits(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (i, a) in from.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, b) in to.iter().enumerate() {
+            let replaced = diagonal + usize::from(a != *b);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[to.len()]
+}
+
+/// `a mug`, `an apple`.
+pub(super) fn a(noun: &str) -> String {
+    let article = match noun.chars().next() {
+        Some('a' | 'e' | 'i' | 'o' | 'u' | 'A' | 'E' | 'I' | 'O' | 'U') => "an",
+        _ => "a",
+    };
+    format!("{article} {noun}")
+}

@@ -1,0 +1,221 @@
+//! One sample event or more of every kind, and what each field means.
+
+use std::collections::BTreeMap;
+
+use apprentice::events::{
+    DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
+    Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed, RetrainScheduled,
+    SessionClosed, SessionOpened,
+};
+use apprentice::ids::{Digest, Seq, UserId};
+use apprentice::language::{
+    Answer, Discarded, Document, Evidence, LiftedUtterance, Near, Outcome, Program, Symbol,
+    Utterance,
+};
+use serde_json::json;
+
+/// Name of the golden files, and the event. The name of a kind's first sample is the kind's.
+pub fn samples() -> Vec<(&'static str, Event)> {
+    vec![
+        ("session_opened", Event::SessionOpened(session_opened())),
+        ("episode_started", Event::EpisodeStarted(episode_started(Some(7), Some(10)))),
+        ("episode_started_from_file", Event::EpisodeStarted(episode_started(None, None))),
+        ("interpreted", Event::Interpreted(interpreted(understood()))),
+        ("interpreted_impossible", Event::Interpreted(interpreted(impossible()))),
+        ("interpreted_not_sure", Event::Interpreted(interpreted(Outcome::NotSure))),
+        ("episode_ended", Event::EpisodeEnded(episode_ended(Ending::Achieved))),
+        ("episode_ended_abandoned", Event::EpisodeEnded(episode_ended(Ending::Abandoned))),
+        ("decomposition_taught", Event::DecompositionTaught(taught())),
+        ("decomposition_declined", Event::DecompositionDeclined(declined())),
+        ("lesson_forgotten", Event::LessonForgotten(forgotten())),
+        ("retrain_scheduled", Event::RetrainScheduled(scheduled())),
+        ("retrain_completed", Event::RetrainCompleted(completed())),
+        ("retrain_failed", Event::RetrainFailed(failed())),
+        ("session_closed", Event::SessionClosed(closed())),
+    ]
+}
+
+/// Fields whose inside belongs to the domain.
+pub const DOCUMENTS: [&str; 2] = ["episode_started.scene", "episode_started.task"];
+
+/// What each field means. A field without a line here fails the test.
+pub const MEANINGS: &[(&str, &str)] = &[
+    ("session_opened.user", "the person, as the tenant's gateway names them"),
+    ("session_opened.domain", "the world they talk about"),
+    ("session_opened.domain_version", "which rules of that world apply"),
+    ("session_opened.recipe", "the recipe's name"),
+    ("session_opened.recipe_text", "the recipe itself (TOML)"),
+    ("session_opened.recipe_digest", "BLAKE3 of the recipe's settings"),
+    ("session_opened.mind", "digest of the base mind they start with"),
+    ("episode_started.scene", "the whole scene, a document of the domain"),
+    ("episode_started.scene_digest", "BLAKE3 of the scene's compact JSON text with sorted keys"),
+    ("episode_started.task", "the task, a document of the domain"),
+    ("episode_started.goal", "the task as a sentence"),
+    ("episode_started.seed", "seed of a drawn stage; null when a scene file was given"),
+    ("episode_started.fewest", "fewest primitives that achieve the task, where known"),
+    ("interpreted.utterance", "what was typed"),
+    ("interpreted.answer.outcome", "understood, impossible or not_sure"),
+    ("interpreted.answer.outcome.understood.program", "what was carried out"),
+    ("interpreted.answer.outcome.understood.bindings[][]", "the things each step acted on"),
+    ("interpreted.answer.outcome.impossible.program", "what was understood and not carried out"),
+    ("interpreted.answer.outcome.impossible.step", "the step that fails, counted from 0"),
+    ("interpreted.answer.outcome.impossible.reason", "why it fails"),
+    ("interpreted.answer.evidence.lifted[]", "the utterance as the parser saw it, by clause"),
+    ("interpreted.answer.evidence.nearest[].exemplar", "a near exemplar, nearest first"),
+    ("interpreted.answer.evidence.nearest[].program", "what it stands for"),
+    ("interpreted.answer.evidence.nearest[].distance", "its distance, no unit"),
+    ("interpreted.answer.evidence.nearest[].number", "its number among the mind's exemplars"),
+    ("interpreted.answer.evidence.threshold", "the distance up to which an exemplar counts"),
+    ("interpreted.answer.evidence.discarded[].program", "a candidate that was dropped"),
+    ("interpreted.answer.evidence.discarded[].reason", "why it was dropped"),
+    ("interpreted.answer.evidence.reranked", "candidates the reranker chose from; 0: not asked"),
+    ("interpreted.answer.mentioned", "the type of the last mention, for a later \"it\""),
+    ("interpreted.actions_before", "primitives carried out in the episode before"),
+    ("interpreted.scene_after", "digest of the scene afterwards"),
+    ("interpreted.mind", "digest of the mind that answered"),
+    ("episode_ended.ending", "achieved or abandoned"),
+    ("episode_ended.utterances", "utterances of the episode"),
+    ("episode_ended.actions", "primitives carried out"),
+    ("episode_ended.to_teach[]", "the interpreted events that may be taught now"),
+    ("decomposition_taught.explains", "the interpreted event that is explained"),
+    ("decomposition_taught.utterance", "its utterance"),
+    ("decomposition_taught.program", "what it stands for"),
+    ("decomposition_taught.first", "first action of the run, counted from 1 in the episode"),
+    ("decomposition_taught.last", "last action of the run, included"),
+    ("decomposition_declined.explains", "the interpreted event that nothing explained"),
+    ("decomposition_declined.utterance", "its utterance"),
+    ("lesson_forgotten.lesson", "the decomposition_taught event that is taken back"),
+    ("lesson_forgotten.utterance", "its utterance"),
+    ("retrain_scheduled.recipe", "digest of the recipe to train by"),
+    ("retrain_scheduled.lessons[]", "the live lessons, in order"),
+    ("retrain_completed.recipe", "digest of the recipe"),
+    ("retrain_completed.mind", "digest of the new mind"),
+    ("retrain_completed.report.exemplars", "seeds and live lessons"),
+    ("retrain_completed.report.threshold", "the calibrated threshold"),
+    ("retrain_completed.report.figures", "what else the parser kind reports, by name"),
+    ("retrain_failed.recipe", "digest of the recipe"),
+    ("retrain_failed.reason", "why; the previous mind stays"),
+    ("session_closed.reason", "why the person withdrew"),
+];
+
+fn seq(number: u64) -> Seq {
+    Seq::new(number).unwrap()
+}
+
+fn utterance(text: &str) -> Utterance {
+    Utterance::new(text).unwrap()
+}
+
+fn program(text: &str) -> Program {
+    text.parse().unwrap()
+}
+
+fn session_opened() -> SessionOpened {
+    SessionOpened {
+        user: UserId::new("ada").unwrap(),
+        domain: "household".to_owned(),
+        domain_version: 1,
+        recipe: "paper".to_owned(),
+        recipe_text: "name = \"paper\"\n".to_owned(),
+        recipe_digest: Digest::of(b"paper"),
+        mind: Digest::of(b"base mind"),
+    }
+}
+
+fn episode_started(seed: Option<u64>, fewest: Option<u32>) -> EpisodeStarted {
+    let scene = Document::of(&json!({"objects": [{"type": "Apple", "hot": false, "x": -3}]}));
+    EpisodeStarted {
+        scene_digest: scene.digest(),
+        scene,
+        task: Document::of(&json!({"kind": "cool_and_place", "object": "Apple"})),
+        goal: "cool the apple and put it on the table".to_owned(),
+        seed,
+        fewest,
+    }
+}
+
+fn understood() -> Outcome {
+    Outcome::Understood {
+        program: program("GOTO Apple; PICKUP Apple"),
+        bindings: vec![vec!["Apple#1".to_owned()], vec!["Apple#1".to_owned()]],
+    }
+}
+
+fn impossible() -> Outcome {
+    Outcome::Impossible {
+        program: program("GOTO Table; PICKUP Table"),
+        step: 1,
+        reason: "the Table cannot be picked up".to_owned(),
+    }
+}
+
+fn interpreted(outcome: Outcome) -> Interpreted {
+    Interpreted {
+        utterance: utterance("Hol den Apfel, 🍎!"),
+        answer: Answer {
+            outcome,
+            evidence: Evidence {
+                lifted: vec![LiftedUtterance::parse("pick up <obj>")],
+                nearest: vec![Near {
+                    exemplar: LiftedUtterance::parse("take <obj> from <obj=fridge>"),
+                    program: "GOTO <obj:2>; PICKUP <obj:1>".parse().unwrap(),
+                    distance: 0.25,
+                    number: 12,
+                }],
+                threshold: 0.5,
+                discarded: vec![Discarded {
+                    program: program("PICKUP Table"),
+                    reason: "the Table cannot be picked up".to_owned(),
+                }],
+                reranked: 2,
+            },
+            mentioned: Some(Symbol::new("Apple")),
+        },
+        actions_before: 4,
+        scene_after: Digest::of(b"scene after"),
+        mind: Digest::of(b"mind"),
+    }
+}
+
+fn episode_ended(ending: Ending) -> EpisodeEnded {
+    EpisodeEnded { ending, utterances: 9, actions: 14, to_teach: vec![seq(4), seq(6)] }
+}
+
+fn taught() -> DecompositionTaught {
+    DecompositionTaught {
+        explains: seq(4),
+        utterance: utterance("chill the apple"),
+        program: program("OPEN Fridge; PUT Apple Fridge; CLOSE Fridge"),
+        first: 3,
+        last: 5,
+    }
+}
+
+fn declined() -> DecompositionDeclined {
+    DecompositionDeclined { explains: seq(6), utterance: utterance("sing a song") }
+}
+
+fn forgotten() -> LessonForgotten {
+    LessonForgotten { lesson: seq(17), utterance: utterance("chill the apple") }
+}
+
+fn scheduled() -> RetrainScheduled {
+    RetrainScheduled { recipe: Digest::of(b"paper"), lessons: vec![seq(17), seq(300)] }
+}
+
+fn completed() -> RetrainCompleted {
+    let figures = BTreeMap::from([("precision".to_owned(), 0.9375), ("steps".to_owned(), 400.0)]);
+    let report = Report { exemplars: 45, threshold: 0.42, figures };
+    RetrainCompleted { recipe: Digest::of(b"paper"), mind: Digest::of(b"mind"), report }
+}
+
+fn failed() -> RetrainFailed {
+    RetrainFailed {
+        recipe: Digest::of(b"paper"),
+        reason: "the seed \"go to <obj>\" lost its own program".to_owned(),
+    }
+}
+
+fn closed() -> SessionClosed {
+    SessionClosed { reason: "the study is over".to_owned() }
+}
