@@ -65,7 +65,7 @@ impl Talk {
             utterance: Utterance::new(text).unwrap(),
             program: program.parse::<Program>().unwrap(),
             scene: Arc::new(scene.clone()),
-            task: Arc::new(self.task.clone()),
+            task: Arc::new(self.task),
             mentioned: None,
         });
         self.mind = train(&self.household, &self.recipe, &self.lessons).unwrap();
