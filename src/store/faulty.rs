@@ -1,10 +1,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::oneshot;
-
-use super::log::{AppendError, EventLog, Pending, ReadError};
+use super::log::{AppendError, EventLog, Pending, Promise, ReadError};
 use super::{Entropy, SeededEntropy};
-use crate::events::{Batch, Durable, Head, Record};
+use crate::events::{Batch, Head, Record};
 use crate::ids::{Seq, StreamId, TenantId};
 
 /// What goes wrong with one append.
@@ -55,7 +53,7 @@ struct State {
 }
 
 struct Held {
-    promise: oneshot::Sender<Result<Durable, AppendError>>,
+    promise: Promise,
     what: What,
 }
 

@@ -29,13 +29,16 @@ pub trait EventLog: Send + Sync {
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError>;
 }
 
+/// The end of a promise that keeps it.
+pub(super) type Promise = oneshot::Sender<Result<Durable, AppendError>>;
+
 /// The promise of an append: a future of [`Durable`] or [`AppendError`].
 #[derive(Debug)]
 pub struct Pending(oneshot::Receiver<Result<Durable, AppendError>>);
 
 impl Pending {
     /// For backends of this room only: the promise and the end that keeps it.
-    pub(super) fn promise() -> (oneshot::Sender<Result<Durable, AppendError>>, Pending) {
+    pub(super) fn promise() -> (Promise, Pending) {
         let (sender, receiver) = oneshot::channel();
         (sender, Pending(receiver))
     }

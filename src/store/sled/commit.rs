@@ -3,14 +3,13 @@ use std::io;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-use tokio::sync::oneshot;
-
 use super::Shared;
 use super::read::{chunk_key, chunks};
 use crate::events::{Durable, Head};
 use crate::ids::{StreamId, TenantId};
 use crate::limits::{COMMIT_GROUP_BYTES_MAX, COMMIT_GROUP_MAX};
 use crate::store::heads::HeadsFile;
+use crate::store::log::Promise;
 use crate::store::quiet::guarded;
 use crate::store::{AppendError, Draft, checks};
 
@@ -24,7 +23,7 @@ pub(super) struct Job {
     pub stream: StreamId,
     pub after: Head,
     pub draft: Draft,
-    pub promise: oneshot::Sender<Answer>,
+    pub promise: Promise,
 }
 
 impl Job {
@@ -46,7 +45,7 @@ pub(super) struct Committer {
 struct Group {
     writes: BTreeMap<TenantId, ::sled::Batch>,
     heads: BTreeMap<StreamId, Head>,
-    kept: Vec<(oneshot::Sender<Answer>, Durable)>,
+    kept: Vec<(Promise, Durable)>,
 }
 
 impl Committer {
