@@ -30,7 +30,7 @@ Exit codes:
 /// your words stood for. With standard input not a terminal, lines are read from it.
 #[derive(Debug, Parser)]
 #[command(name = "apprentice", version, after_help = AFTER_HELP, args_conflicts_with_subcommands = true)]
-struct Arguments {
+struct CommandLine {
     #[command(subcommand)]
     command: Option<Verb>,
     #[command(flatten)]
@@ -49,14 +49,14 @@ enum Verb {
 
 /// Reads the command line, does what it says and gives the exit code.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = CommandLine::parse();
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }
 }
 
-fn run(arguments: Arguments) -> Result<(), Failure> {
+fn run(arguments: CommandLine) -> Result<(), Failure> {
     // Who serves others wants to see that it runs; who talks wants to see the conversation.
     let filter = match arguments.command {
         Some(Verb::Serve(_)) => "info",
@@ -79,12 +79,12 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        Arguments::command().debug_assert();
+        CommandLine::command().debug_assert();
     }
 
     #[test]
     fn every_command_says_how_it_ends() {
-        let help = Arguments::command().render_help().to_string();
+        let help = CommandLine::command().render_help().to_string();
         for part in ["Exit codes", "Examples", "--seed", "transcript", "--log-filter"] {
             assert!(help.contains(part), "{part} is missing in\n{help}");
         }
@@ -92,10 +92,10 @@ mod tests {
 
     #[test]
     fn options_of_a_conversation_do_not_slip_before_a_command() {
-        assert!(Arguments::try_parse_from(["apprentice", "--seed", "7", "serve"]).is_err());
+        assert!(CommandLine::try_parse_from(["apprentice", "--seed", "7", "serve"]).is_err());
         let after = ["apprentice", "serve", "--data", "d", "--zmq", "tcp://127.0.0.1:1"];
-        assert!(Arguments::try_parse_from(after).is_ok());
+        assert!(CommandLine::try_parse_from(after).is_ok());
         let logging = ["apprentice", "talk", "--connect", "ipc://x", "--log-format", "json"];
-        assert!(Arguments::try_parse_from(logging).is_ok());
+        assert!(CommandLine::try_parse_from(logging).is_ok());
     }
 }
