@@ -76,7 +76,7 @@ struct Entry {
 /// Milliseconds after which a request that met a full queue may be sent again.
 const RETRY_FULL_MS: u32 = 100;
 /// Milliseconds after which a request may be sent again that found everybody busy.
-const RETRY_CROWD_MS: u32 = 1_000;
+const RETRY_CROWD_MS: u32 = 200;
 /// How many of the longest idle are asked whether they may sleep before a request is refused.
 const SLEEPERS_TRIED_MAX: usize = 64;
 

@@ -24,7 +24,7 @@ pub struct Submit {
 /// request id is always safe (invariant `ExactlyOnce`).
 pub struct AnswerTo {
     way: Option<Box<dyn FnOnce(Response) + Send>>,
-    /// Keeps the person's actor from being put to sleep before the answer is out.
+    /// Keeps the person's actor from being put to sleep before there is an answer.
     awake: Option<Attention>,
 }
 
@@ -38,6 +38,9 @@ impl AnswerTo {
     }
 
     pub fn send(mut self, response: Response) {
+        // Before the answer is out: whoever gets it may ask at once for somebody else, who needs
+        // this one's place. The message that sends an actor to sleep waits for its handler's end.
+        self.awake = None;
         if let Some(way) = self.way.take() {
             way(response);
         }
