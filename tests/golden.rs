@@ -4,7 +4,7 @@
 #[path = "golden/samples.rs"]
 mod samples;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -169,6 +169,7 @@ fn fields(path: &str, value: &Value, found: &mut BTreeMap<String, Vec<&'static s
 /// The catalogue of `schema/events.md`.
 fn catalogue() -> String {
     let mut out = String::new();
+    let mut described: BTreeSet<&str> = MEANINGS.iter().map(|(path, _)| *path).collect();
     for kind in EventKind::ALL {
         let (name, number, version) = (snake(kind), kind as u16, kind.version());
         let mut found = BTreeMap::new();
@@ -179,12 +180,14 @@ fn catalogue() -> String {
         writeln!(out, "| field | value | meaning |\n|---|---|---|").unwrap();
         for (path, kinds) in found {
             let meaning = MEANINGS.iter().find(|(known, _)| *known == path);
+            described.remove(path.as_str());
             let (_, meaning) = meaning.unwrap_or_else(|| panic!("{path} has no meaning yet"));
             let field = path.strip_prefix(&format!("{name}.")).unwrap();
             writeln!(out, "| `{field}` | {} | {meaning} |", kinds.join(" or ")).unwrap();
         }
         writeln!(out).unwrap();
     }
+    assert!(described.is_empty(), "no sample has the fields {described:?}");
     out
 }
 

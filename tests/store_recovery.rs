@@ -53,7 +53,7 @@ fn child_that_appends_until_it_is_killed() {
                 let long = "z".repeat(30_000);
                 loop {
                     let head = store.log.head(&who).unwrap();
-                    let second = if head.seq % 5 == 0 { long.as_str() } else { "b" };
+                    let second = if head.seq.is_multiple_of(5) { long.as_str() } else { "b" };
                     let durable = store.log.append(&who, head, batch(["a", second])).wait();
                     let mut out = std::io::stdout().lock();
                     for record in durable.unwrap().records() {

@@ -50,6 +50,8 @@ type Atomic<D> = LocalBoxActorFuture<UserActor<D>, ()>;
 
 /// Seconds after which a training is asked for again when the trainers' queue was full.
 const TRAIN_AGAIN_S: u64 = 1;
+/// Milliseconds after which a request may be sent again that met an actor on its way out.
+const RETRY_LEAVING_MS: u32 = 20;
 /// Milliseconds after which a request may be sent again that met another writer, or a full log.
 const RETRY_APPEND_MS: u32 = 100;
 
@@ -71,8 +73,14 @@ impl<D: Domain> UserActor<D> {
     }
 
     /// Stops in the only way that loses no message: the directory forgets this actor, and then
-    /// sends it to sleep. Until then everything is answered with `response`.
-    fn leave(&mut self, response: Response) {
+    /// sends it to sleep. Whoever asks in between is told to ask again, which wakes a new one.
+    fn leave(&mut self) {
+        self.leave_with(Response::busy("the session is read from the log again", RETRY_LEAVING_MS));
+    }
+
+    /// As [`UserActor::leave`], when a new actor would fare no better: until the directory has
+    /// heard of it, everybody is answered with `response`.
+    fn leave_with(&mut self, response: Response) {
         self.waiters.clear();
         self.stage = Stage::Leaving(response);
         let (stream, generation) = (self.waking.stream.clone(), self.waking.generation);
@@ -100,8 +108,8 @@ impl<D: Domain> UserActor<D> {
             Ask::Query(query) => match view(session, query) {
                 Ok(response) => answer.send(response),
                 Err(panic) => {
-                    answer.send(panic.clone());
-                    self.leave(panic);
+                    answer.send(panic);
+                    self.leave();
                 }
             },
             Ask::Wait { seconds } => self.wait(seconds, answer, ctx),
@@ -164,9 +172,8 @@ impl<D: Domain> UserActor<D> {
                 return Self::done();
             }
             Err(panic) => {
-                let response = defect("deciding", &*panic);
-                respond(answer, response.clone());
-                self.leave(response);
+                respond(answer, defect("deciding", &*panic));
+                self.leave();
                 return Self::done();
             }
         };
@@ -192,22 +199,20 @@ impl<D: Domain> UserActor<D> {
             Ok(Ok(reply)) => reply,
             Ok(Err(divergence)) => {
                 tracing::error!(stream = %self.waking.stream, %divergence, "binary and log disagree");
-                let response = Response::error(ErrorCode::Internal, divergence.to_string());
-                respond(answer, response.clone());
-                return self.leave(response);
+                respond(answer, Response::error(ErrorCode::Internal, divergence.to_string()));
+                return self.leave();
             }
             Err(panic) => {
-                let response = defect("applying", &*panic);
-                respond(answer, response.clone());
-                return self.leave(response);
+                respond(answer, defect("applying", &*panic));
+                return self.leave();
             }
         };
         if let Command::FinishRetrain { .. } = command {
             self.last_told = reply.told.clone();
         }
-        if let Err(response) = self.equip() {
+        if !self.equip() {
             respond(answer, Response::Reply(reply));
-            return self.leave(response);
+            return self.leave();
         }
         if let (Command::FinishRetrain { .. }, Stage::Awake(session)) = (command, &self.stage) {
             life::forget_old_minds(&self.life, &self.waking.stream, session);
@@ -216,16 +221,17 @@ impl<D: Domain> UserActor<D> {
         respond(answer, Response::Reply(reply));
     }
 
-    /// Gives the session the mind its state names, which a training or an activation made known.
-    fn equip(&mut self) -> Result<(), Response> {
-        let Stage::Awake(session) = &mut self.stage else { return Ok(()) };
-        let Some(wanted) = session.mind_wanted() else { return Ok(()) };
-        match self.life.mind(&self.waking.stream.tenant, wanted) {
-            Some(mind) => session.install(mind),
-            // Rare: the memory of minds is small. Rebuilding finds or trains it again.
-            None => return Err(Response::busy("the mind is being fetched again", RETRY_APPEND_MS)),
-        }
-        Ok(())
+    /// Gives the session the mind that its state names since a training was recorded.
+    ///
+    /// - returns: whether it has it. Not having it is rare, the memory of minds being large:
+    ///   waking again finds or trains it.
+    fn equip(&mut self) -> bool {
+        let Stage::Awake(session) = &mut self.stage else { return false };
+        let Some(wanted) = session.mind_wanted() else { return true };
+        let mind = self.life.mind(&self.waking.stream.tenant, wanted);
+        let found = mind.is_some();
+        mind.into_iter().for_each(|mind| session.install(mind));
+        found
     }
 
     /// What is due after every turn and every activation.
@@ -286,9 +292,9 @@ impl<D: Domain> UserActor<D> {
                 (Response::error(ErrorCode::Unavailable, sentence), false)
             }
         };
-        respond(answer, response.clone());
+        respond(answer, response);
         if !stays {
-            self.leave(response);
+            self.leave();
         }
     }
 }
@@ -314,7 +320,7 @@ impl<D: Domain> Actor for UserActor<D> {
                 }
                 Err(response) => {
                     tracing::error!(stream = %actor.waking.stream, ?response, "cannot be woken");
-                    actor.leave(response);
+                    actor.leave_with(response);
                 }
             }
         }));

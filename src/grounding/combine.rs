@@ -188,16 +188,22 @@ impl<D: Domain> Ground<'_, D> {
     ) -> Result<(), (u32, String)> {
         let (domain, task) = (self.moment.domain, self.moment.task);
         let before = steps.len();
-        if self.execution.polarity
-            && let Some((step, reason)) = domain.contradiction(scene, &offer.clause.words, program)
-        {
-            return Err(((before + step) as u32, reason));
+        let contradicted = |scene: &D::Scene, from: usize| {
+            let rest = Program { steps: program.steps[from..].to_vec() };
+            if !self.execution.polarity {
+                return None;
+            }
+            let (step, reason) = domain.contradiction(scene, &offer.clause.words, &rest)?;
+            Some(((before + from + step) as u32, reason))
+        };
+        if let Some(contradiction) = contradicted(scene, 0) {
+            return Err(contradiction);
         }
         for (index, step) in program.steps.iter().enumerate() {
-            if steps.len() >= PROGRAM_STEPS_MAX {
-                return Err(((before + index) as u32, "the program is too long".to_owned()));
-            }
             let refused = |reason| ((before + index) as u32, reason);
+            if steps.len() >= PROGRAM_STEPS_MAX {
+                return Err(refused("the program is too long".to_owned()));
+            }
             domain.signature().check(step).map_err(refused)?;
             let mut unasked = 0;
             let bound = loop {
@@ -214,6 +220,10 @@ impl<D: Domain> Ground<'_, D> {
                 steps.push(first);
                 bindings.push(bound);
                 unasked += 1;
+                // What was too far away to contradict the words is near now.
+                if let Some(contradiction) = contradicted(scene, index) {
+                    return Err(contradiction);
+                }
             };
             bindings.push(bound);
             steps.push(step.clone());

@@ -87,14 +87,14 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     }
 
     /// Parses a clause in each of its readings.
-    fn listen(&self, clause: Clause) -> Heeded {
+    fn listen(&self, clause: Clause) -> ParsedClause {
         let without = self.abstraction.locations.then(|| without_locations(&clause)).flatten();
         let readings = [Some(clause), without].into_iter().flatten();
         let parse = |clause: Clause| {
             let parse = self.parser.parse(&clause);
             (clause, parse)
         };
-        Heeded { readings: readings.map(parse).collect() }
+        ParsedClause { readings: readings.map(parse).collect() }
     }
 
     /// Grounds each way of reading the utterance; equal programs are kept once, nearest first.
@@ -127,12 +127,12 @@ enum Ways {
 }
 
 /// One clause with its readings, each parsed.
-struct Heeded {
+struct ParsedClause {
     /// The clause as said comes first.
     readings: Vec<(Clause, Parse)>,
 }
 
-impl Heeded {
+impl ParsedClause {
     fn exact(&self) -> bool {
         self.readings.iter().any(|(_, parse)| parse.exact > 0)
     }
@@ -173,9 +173,9 @@ impl Heeded {
 
 /// The utterance, whole and cut, parsed.
 struct Heard {
-    whole: Heeded,
+    whole: ParsedClause,
     /// Empty when there is nothing to cut.
-    parts: Vec<Heeded>,
+    parts: Vec<ParsedClause>,
     seeds: u32,
 }
 
@@ -186,7 +186,7 @@ impl Heard {
     }
 
     fn parts_exact(&self) -> bool {
-        !self.parts.is_empty() && self.parts.iter().all(Heeded::exact)
+        !self.parts.is_empty() && self.parts.iter().all(ParsedClause::exact)
     }
 
     /// The ways of reading the utterance that may decide what it means.
@@ -217,8 +217,9 @@ impl Heard {
             Some(candidate) => candidate.lifted.len() > 1,
             None => !self.parts.is_empty(),
         };
-        let silent = |part: &&Heeded| part.readings.iter().all(|(_, p)| p.candidates.is_empty());
-        let explained: Vec<&Heeded> = match (in_parts, told) {
+        let silent =
+            |part: &&ParsedClause| part.readings.iter().all(|(_, p)| p.candidates.is_empty());
+        let explained: Vec<&ParsedClause> = match (in_parts, told) {
             (false, _) => vec![&self.whole],
             (true, Some(_)) => self.parts.iter().collect(),
             (true, None) => self.parts.iter().filter(silent).collect(),

@@ -90,7 +90,7 @@ mod tests {
     fn a_mind_of_any_size_is_found_by_its_digest() {
         on_both(|store, ada| {
             for length in [0, 1, STORE_VALUE_BYTES_MAX - 40, STORE_VALUE_BYTES_MAX, 900_000] {
-                let bytes: Vec<u8> = (0..length).map(|i| (i * 31 >> 3) as u8).collect();
+                let bytes: Vec<u8> = (0..length).map(|i| ((i * 31) >> 3) as u8).collect();
                 let digest = Digest::of(&bytes);
                 assert_eq!(store.models.load(ada, digest), None);
                 store.models.put(ada, digest, &bytes).unwrap();

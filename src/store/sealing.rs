@@ -130,7 +130,6 @@ impl Draft {
                 version: kind.version(),
             };
             let frame = header.frame(&key.seal(entropy, &bound_bytes(&header), &plain));
-            plain.zeroize();
             let digest = Digest::of(&frame);
             head = Head { seq: seq.get(), digest };
             sealed.records.push(Record {
@@ -211,7 +210,7 @@ impl Walk {
         let (header, sealed) = self.step(frame)?;
         let seq = header.seq.get();
         let wrong = |reason: &str| ReadError::Seal { seq, reason: reason.to_owned() };
-        let mut plain = key
+        let plain = key
             .open(&bound_bytes(&header), sealed)
             .ok_or_else(|| wrong("the seal does not fit the key, the header or the bytes"))?;
         let (salt, body) = plain
@@ -221,7 +220,6 @@ impl Walk {
             return Err(wrong("the body is not the one that the header commits to"));
         }
         let event = decode(header.kind, header.version, body);
-        plain.zeroize();
         Ok(Record {
             seq: header.seq,
             at: header.at,

@@ -52,7 +52,14 @@ struct Shared {
     /// What is durable. Readers see nothing beyond it.
     heads: RwLock<Heads>,
     poisoned: OnceLock<String>,
-    waiting_bytes: AtomicUsize,
+    waiting: Waiting,
+}
+
+/// What stands in the committer's queue.
+#[derive(Default)]
+struct Waiting {
+    batches: AtomicUsize,
+    bytes: AtomicUsize,
 }
 
 /// Something that was there and is not any more, found when a log is opened.
@@ -139,7 +146,7 @@ impl SledLog {
             keys,
             heads: RwLock::new(heads),
             poisoned: OnceLock::new(),
-            waiting_bytes: AtomicUsize::new(0),
+            waiting: Waiting::default(),
         });
         let (sender, receiver) = sync_channel(COMMIT_QUEUE_MAX);
         let committer = Committer::new(shared.clone(), heads_file, sync);
@@ -161,7 +168,7 @@ impl Drop for SledLog {
         // The committer answers what is waiting, then ends with its channel.
         self.sender = None;
         if let Some(committer) = self.committer.take() {
-            // A committer that panicked has poisoned the log and told everybody who waited.
+            // A committer that panicked has dropped its promises: everybody heard `Gone`.
             let _ = committer.join();
         }
     }
@@ -177,23 +184,22 @@ impl EventLog for SledLog {
             Err(error) => return Pending::kept(Err(error)),
         };
         let bytes = draft.bytes();
-        let waiting = self.shared.waiting_bytes.fetch_add(bytes, Ordering::Relaxed);
         let (promise, pending) = Pending::promise();
         let job = Job { stream: stream.clone(), after, draft, promise };
         let sender = self.sender.as_ref().expect("only dropping the log takes it");
-        let refused = match waiting + bytes > COMMIT_QUEUE_BYTES_MAX {
-            true => Some((job, AppendError::Busy { waiting: COMMIT_QUEUE_MAX })),
-            false => match sender.try_send(job) {
-                Ok(()) => None,
-                Err(TrySendError::Full(job)) => {
-                    Some((job, AppendError::Busy { waiting: COMMIT_QUEUE_MAX }))
-                }
-                Err(TrySendError::Disconnected(job)) => Some((job, AppendError::Gone)),
-            },
+        let waiting = self.shared.waiting.add(bytes);
+        let sent = match waiting.bytes > COMMIT_QUEUE_BYTES_MAX {
+            true => Err(TrySendError::Full(job)),
+            false => sender.try_send(job),
         };
-        if let Some((job, error)) = refused {
-            self.shared.waiting_bytes.fetch_sub(bytes, Ordering::Relaxed);
-            job.answer(Err(error));
+        if let Err(refused) = sent {
+            self.shared.waiting.remove(1, bytes);
+            match refused {
+                TrySendError::Full(job) => {
+                    job.answer(Err(AppendError::Busy { waiting: waiting.batches - 1 }));
+                }
+                TrySendError::Disconnected(job) => job.answer(Err(AppendError::Gone)),
+            }
         }
         pending
     }
@@ -228,7 +234,32 @@ impl EventLog for SledLog {
     }
 }
 
+/// A reading of [`Waiting`].
+struct Queue {
+    batches: usize,
+    bytes: usize,
+}
+
+impl Waiting {
+    /// Counts one more batch; returns what stands there with it.
+    fn add(&self, bytes: usize) -> Queue {
+        let batches = self.batches.fetch_add(1, Ordering::Relaxed) + 1;
+        Queue { batches, bytes: self.bytes.fetch_add(bytes, Ordering::Relaxed) + bytes }
+    }
+
+    fn remove(&self, batches: usize, bytes: usize) {
+        self.batches.fetch_sub(batches, Ordering::Relaxed);
+        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
 impl Shared {
+    /// The first reason counts; the log stays poisoned until it is opened anew.
+    fn poison(&self, reason: String) {
+        tracing::error!(%reason, "the log is poisoned: nothing is acknowledged any more");
+        let _ = self.poisoned.set(reason);
+    }
+
     fn head(&self, stream: &StreamId) -> Head {
         let heads = self.heads.read().expect("no holder of the heads panics");
         let found = heads.get(&stream.tenant).and_then(|streams| streams.get(&stream.key));

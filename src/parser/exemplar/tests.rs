@@ -299,7 +299,7 @@ fn no_utterance_upsets_the_parser() {
     for _ in 0..300 {
         let length = rng.below(200);
         let text: Vec<&str> = (0..length).map(|_| words[rng.below(words.len())]).collect();
-        let parse = parser.parse(&LiftedUtterance::parse(&text.join(" ")));
+        let parse = parser.parse(&clause(&text.join(" ")));
         assert!(parse.candidates.iter().all(|c| c.distance <= parse.threshold), "{text:?}");
         assert!(parse.nearest.iter().all(|near| near.distance.is_finite()), "{text:?}");
         assert_eq!(parse.nearest.is_empty(), text.is_empty());

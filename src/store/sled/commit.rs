@@ -1,7 +1,6 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 
 use tokio::sync::oneshot;
@@ -65,7 +64,7 @@ impl Committer {
                 bytes += job.draft.bytes();
                 group.push(job);
             }
-            self.shared.waiting_bytes.fetch_sub(bytes, Ordering::Relaxed);
+            self.shared.waiting.remove(group.len(), bytes);
             self.commit(group);
         }
     }
@@ -85,9 +84,8 @@ impl Committer {
                 }
             }
             Err(reason) => {
-                tracing::error!(%reason, "the log is poisoned: nothing is acknowledged any more");
                 let poisoned = AppendError::Poisoned { reason: reason.clone() };
-                let _ = self.shared.poisoned.set(reason);
+                self.shared.poison(reason);
                 for (promise, _) in kept {
                     let _ = promise.send(Err(poisoned.clone()));
                 }
@@ -161,10 +159,10 @@ impl Committer {
             heads.entry(stream.tenant).or_default().insert(stream.key, head);
         }
         drop(heads);
-        // Rewriting is housekeeping: if it fails, so will the next append, which says so.
+        // A rewrite that fails half-way leaves us with a file that may have lost its name.
         let heads = self.shared.heads.read().expect("no holder of the heads panics");
         if let Err(error) = self.heads_file.compact_if_long(&heads) {
-            tracing::warn!(%error, "the heads file could not be rewritten");
+            self.shared.poison(format!("the heads file cannot be rewritten: {error}"));
         }
     }
 }

@@ -1,0 +1,179 @@
+//! A world of three bells, for tests that are about the service and not about the household: it
+//! trains in no time, and proves that nothing outside `world/` knows about mugs.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use apprentice::ids::Digest;
+use apprentice::language::{
+    Exemplar, LiftedUtterance, Mention, Operator, Program, Signature, Step, Symbol,
+};
+use apprentice::learning::Recipe;
+use apprentice::service::{Config, Data};
+use apprentice::world::{
+    Domain, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
+};
+
+/// Bells ring until they are muted. Say `panic now` of a bell and the world breaks down, which is
+/// for tests of what the service makes of it.
+pub struct Bells {
+    signature: Signature,
+    lexicon: Lexicon,
+    seeds: SeedSet,
+}
+
+/// Bells that ring.
+type Ringing = BTreeSet<Symbol>;
+
+pub const BELLS: [&str; 3] = ["Brass", "Silver", "Glass"];
+
+/// A service of bells with the smallest recipe.
+pub fn config(data: Data) -> Config<Bells> {
+    let mut config = Config::new(Arc::new(Bells::new()), data);
+    config.recipe_text = Recipe::builtin("tiny").expect("the recipe `tiny` ships").to_owned();
+    config
+}
+
+fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
+    let exemplar = |(utterance, program): &(&str, &str)| Exemplar {
+        utterance: LiftedUtterance::parse(utterance),
+        program: program.parse().unwrap(),
+    };
+    pairs.iter().map(exemplar).collect()
+}
+
+impl Bells {
+    pub fn new() -> Bells {
+        let operator = |name| Operator { name: Symbol::new(name), args: vec![Symbol::new("obj")] };
+        let meaning = |kind: &str| Meaning { sort: "obj".into(), kind: kind.into(), count: 1 };
+        let name = |kind: &&str| (format!("{} bell", kind.to_lowercase()), vec![meaning(kind)]);
+        let lexicon = Lexicon {
+            names: BELLS.iter().map(name).collect(),
+            plurals: BTreeMap::new(),
+            pronouns: vec!["it".to_owned()],
+            adjectives: Vec::new(),
+            fixtures: BTreeMap::new(),
+        };
+        let seeds = SeedSet {
+            exemplars: exemplars(&[
+                ("ring the <obj>", "RING <obj:1>"),
+                ("strike the <obj>", "RING <obj:1>"),
+                ("mute the <obj>", "MUTE <obj:1>"),
+                ("silence the <obj>", "MUTE <obj:1>"),
+                ("break the <obj>", "BREAK <obj:1>"),
+            ]),
+            variants: exemplars(&[
+                ("ring the <obj> now", "RING <obj:1>"),
+                ("please mute the <obj>", "MUTE <obj:1>"),
+            ]),
+            unknown: vec![
+                LiftedUtterance::parse("polish the <obj>"),
+                LiftedUtterance::parse("paint the <obj>"),
+            ],
+        };
+        let operators = ["RING", "MUTE", "BREAK"].map(operator).to_vec();
+        Bells { signature: Signature { operators }, lexicon, seeds }
+    }
+}
+
+impl Domain for Bells {
+    type Scene = Ringing;
+    type Task = Ringing;
+
+    fn id(&self) -> &'static str {
+        "bells"
+    }
+    fn version(&self) -> u16 {
+        1
+    }
+    fn signature(&self) -> &Signature {
+        &self.signature
+    }
+    fn lexicon(&self) -> &Lexicon {
+        &self.lexicon
+    }
+    fn seeds(&self) -> &SeedSet {
+        &self.seeds
+    }
+
+    /// A task is the bells that are to ring, like `Brass Glass`; at first all are silent.
+    fn stage(&self, request: &Stage) -> Result<(Ringing, Ringing), StageError> {
+        let task = match request {
+            Stage::Seed { seed } => BELLS[*seed as usize % 3].to_owned(),
+            Stage::Task { task, .. } | Stage::Scene { task, .. } => task.clone(),
+        };
+        let bells: Ringing = task.split(' ').map(Symbol::new).collect();
+        match bells.iter().find(|bell| !BELLS.contains(&bell.as_str())) {
+            None => Ok((Ringing::new(), bells)),
+            Some(bell) => Err(StageError::Task {
+                task: task.clone(),
+                reason: format!("{bell:?} is no bell"),
+                known: format!("bells are {}", BELLS.join(", ")),
+            }),
+        }
+    }
+
+    fn step(
+        &self,
+        scene: &mut Ringing,
+        _: &Ringing,
+        step: &Step,
+    ) -> Result<Vec<String>, Infeasible> {
+        let bell = &step.args[0];
+        let changed = match step.operator.as_str() {
+            "RING" => scene.insert(bell.clone()),
+            "MUTE" => scene.remove(bell.as_str()),
+            _ => panic!("the bell broke"),
+        };
+        match changed {
+            true => Ok(vec![bell.to_string()]),
+            false => {
+                let reason = format!("the {bell} bell is so already");
+                Err(Infeasible { reason, first: None })
+            }
+        }
+    }
+
+    fn achieved(&self, scene: &Ringing, task: &Ringing) -> bool {
+        scene == task
+    }
+    fn plan(&self, _: &Ringing, task: &Ringing) -> Option<Program> {
+        let ring = |bell: &Symbol| Step { operator: "RING".into(), args: vec![bell.clone()] };
+        Some(Program { steps: task.iter().map(ring).collect() })
+    }
+    fn resolve(&self, _: &Ringing, mention: &Mention) -> Vec<Symbol> {
+        mention.types.clone()
+    }
+    fn held(&self, _: &Ringing) -> Option<Symbol> {
+        None
+    }
+    fn feature_count(&self) -> usize {
+        1
+    }
+    fn features(&self, scene: &Ringing, _: &Program) -> Vec<f32> {
+        vec![scene.len() as f32 / 3.0]
+    }
+    fn digest(&self, scene: &Ringing) -> Digest {
+        Digest::of(format!("{scene:?}").as_bytes())
+    }
+    fn goal(&self, task: &Ringing) -> String {
+        let bells: Vec<&str> = task.iter().map(Symbol::as_str).collect();
+        format!("let ring: {}", bells.join(", "))
+    }
+    fn progress(&self, scene: &Ringing, task: &Ringing) -> Vec<(String, bool)> {
+        task.iter().map(|bell| (bell.to_string(), scene.contains(bell))).collect()
+    }
+    fn look(&self, scene: &Ringing) -> View {
+        let thing = |kind: &&str| Thing {
+            name: (*kind).to_owned(),
+            kind: Symbol::new(kind),
+            place: None,
+            at: (0, 0),
+            states: scene.contains(*kind).then(|| "ringing".to_owned()).into_iter().collect(),
+        };
+        View { summary: Vec::new(), things: BELLS.iter().map(thing).collect() }
+    }
+    fn narrate(&self, step: &Step, binding: &[String]) -> String {
+        format!("{} {}", step.operator.as_str().to_lowercase(), binding.join(" "))
+    }
+}
