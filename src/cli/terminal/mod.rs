@@ -16,6 +16,7 @@ use super::failure::Failure;
 use crate::frontends::Client;
 use conversation::Conversation;
 use lines::{EditedLines, Lines, PipedLines};
+pub(super) use print::count;
 use screen::{Screen, Style};
 use stages::Stages;
 

@@ -51,6 +51,11 @@ fn impossible(program: &Program, step: u32, reason: &str) -> String {
 
 fn not_sure(evidence: &Evidence) -> String {
     match evidence.nearest.first() {
+        // Near enough, and still no program: a slot of it had no mention to fill it.
+        Some(near) if near.distance <= evidence.threshold => format!(
+            "{NOT_SURE} The nearest thing I know is \"{}\", and not all that it needs was named.",
+            near.exemplar
+        ),
         Some(near) => format!(
             "{NOT_SURE} The nearest thing I know is \"{}\", at distance {:.2}; I go along up to \
              {:.2}.",
@@ -362,6 +367,14 @@ mod tests {
             ["I'm sorry - I don't understand! The nearest thing I know is \"pick up the <obj>\", \
               at distance 0.91; I go along up to 0.42."]
         );
+    }
+
+    #[test]
+    fn a_near_request_that_names_too_little_says_so() {
+        let mut told = answered(Outcome::NotSure);
+        told.evidence.nearest[0].distance = 0.2;
+        let lines = answer(&told, &[]);
+        assert!(lines[0].ends_with("and not all that it needs was named."), "{lines:?}");
     }
 
     #[test]

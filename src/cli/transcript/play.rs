@@ -2,6 +2,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::line::{Act, Answer, Kind, Line, Setting, Transcript};
+use crate::cli::terminal::count;
 use crate::events::Ending;
 use crate::frontends::{Client, ClientError};
 use crate::ids::Seq;
@@ -184,7 +185,11 @@ impl<'a> Player<'a> {
                     played.answers.push(shown);
                 }
                 Told::EpisodeEnded { ending: Ending::Achieved, utterances, actions, .. } => {
-                    let line = format!("achieved ({utterances} utterances, {actions} actions)");
+                    let line = format!(
+                        "achieved ({}, {})",
+                        count(*utterances, "utterance"),
+                        count(*actions, "action")
+                    );
                     played.answers.push((Answer::Achieved, line));
                 }
                 Told::Taught { lesson, explains, utterance, program, .. } => {
@@ -288,9 +293,14 @@ fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answer, String)
         }
         Outcome::NotSure => {
             let text = match evidence.nearest.first() {
-                Some(near) => format!(
+                Some(near) if near.distance > evidence.threshold => format!(
                     "? not sure (nearest \"{}\", {:.2} > {:.2})",
                     near.exemplar, near.distance, evidence.threshold
+                ),
+                // Near enough, and still no program: a slot of it had no mention to fill it.
+                Some(near) => format!(
+                    "? not sure (nearest \"{}\", but not all it needs was named)",
+                    near.exemplar
                 ),
                 None => "? not sure".to_owned(),
             };
