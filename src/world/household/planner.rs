@@ -4,8 +4,8 @@
 //! **Why the answer is exact.** A step names kinds, and which instance it binds to depends on
 //! where the robot stands. So the search carries out real steps ([`act`]) on a smaller scene that
 //! keeps every instance of every *relevant* kind — what the task names, its appliances, what any
-//! instance of those is in or on, and what the hand holds — with everything around them and every
-//! free-standing thing. Steps on other kinds change nothing that the goal or a binding looks at,
+//! instance of those is in or on or, when it can be carried, contains, what the hand holds and where
+//! that can be put — with everything around them and every free-standing thing. Steps on other kinds change nothing that the goal or a binding looks at,
 //! with one exception: walking to another thing can change which instance is nearest. Those walks
 //! are tried too. What a relevant step does depends on relevant things only, so each step of the
 //! small scene does the same in the whole one, and no useful step is left out. Turning things on
@@ -203,13 +203,11 @@ fn relevant(scene: &Scene, task: &Task) -> Vec<Kind> {
     if let Some(held) = scene.robot.holds {
         let held = scene.object(held).kind;
         mark(held);
-        // A hand that is full in the way has to be emptied somewhere.
-        if !task.needs().contains(&held) {
-            let places = scene.objects.iter().map(|object| object.kind);
-            places.filter(|place| place.may_hold(held)).for_each(|place| {
-                mark(place);
-            });
-        }
+        // Whatever it is, putting it down here and now may be the shortest way on.
+        let places = scene.objects.iter().map(|object| object.kind);
+        places.filter(|place| place.may_hold(held)).for_each(|place| {
+            mark(place);
+        });
     }
     if task.closed {
         let doors = scene.objects.iter().filter(|o| o.kind.has_door() && !o.shut());
@@ -217,15 +215,22 @@ fn relevant(scene: &Scene, task: &Task) -> Vec<Kind> {
             mark(door.kind);
         });
     }
-    // What a relevant thing is in or on matters too, and then all things of that kind.
+    // What a relevant thing is in or on matters too, and what a relevant thing that can be carried
+    // contains (it moves along, and can be walked to); then all things of those kinds.
+    let is = |wanted: &[bool], index: Index| wanted[usize::from(scene.object(index).kind.0)];
     loop {
-        let missing = (0..scene.objects.len() as Index)
-            .filter(|&index| wanted[usize::from(scene.object(index).kind.0)])
-            .flat_map(|index| scene.ancestors(index))
-            .map(|around| scene.object(around).kind)
-            .find(|kind| !wanted[usize::from(kind.0)]);
+        let missing = (0..scene.objects.len() as Index).find_map(|index| {
+            let inside = scene.ancestors(index).find(|&around| !is(&wanted, around));
+            let carried = |around: Index| scene.object(around).kind.pickupable();
+            if is(&wanted, index) {
+                inside
+            } else {
+                let around = |i: Index| is(&wanted, i) && carried(i);
+                scene.ancestors(index).any(around).then_some(index)
+            }
+        });
         match missing {
-            Some(kind) => wanted[usize::from(kind.0)] = true,
+            Some(index) => wanted[usize::from(scene.object(index).kind.0)] = true,
             None => break,
         }
     }
