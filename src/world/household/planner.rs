@@ -26,14 +26,19 @@ use super::task_goal::achieved;
 use crate::language::Program;
 use crate::limits::PROGRAM_STEPS_MAX;
 
-/// Scenes looked at before the planner gives up.
-const NODES_MAX: usize = 60_000;
+/// Things in all scenes looked at, before the planner gives up: about 15,000 scenes of an ordinary
+/// room, fewer of a crowded one, so that no scene file can keep the planner busy for long.
+const THINGS_MAX: usize = 1_000_000;
 
 /// A program with the fewest primitives that achieves the task; empty programs do not exist, so a
-/// task that is already done has none. `None` also beyond [`NODES_MAX`] scenes or
+/// task that is already done has none. `None` also beyond [`THINGS_MAX`] or
 /// [`PROGRAM_STEPS_MAX`] steps.
 pub(super) fn plan(scene: &Scene, task: &Task) -> Option<Program> {
-    if matches!(task.goal, Goal::Free(_)) || achieved(scene, task) {
+    let missing = |kind: &Kind| scene.of(*kind).next().is_none();
+    if matches!(task.goal, Goal::Free(_))
+        || achieved(scene, task)
+        || task.needs().iter().any(missing)
+    {
         return None;
     }
     let search = Search::new(scene, task);
@@ -88,6 +93,7 @@ impl<'a> Search<'a> {
     }
 
     fn run(&self, start: Scene) -> Option<Vec<Action>> {
+        let nodes_max = THINGS_MAX / start.objects.len().max(1);
         let start = Rc::new(start);
         let mut nodes = vec![Node { scene: start.clone(), steps: 0, from: None }];
         let mut best: BTreeMap<Rc<Scene>, u32> = BTreeMap::from([(start.clone(), 0)]);
@@ -109,7 +115,7 @@ impl<'a> Search<'a> {
                 if best.get(&next).is_some_and(|known| *known <= steps + 1) {
                     continue;
                 }
-                if nodes.len() == NODES_MAX {
+                if nodes.len() >= nodes_max {
                     return None;
                 }
                 let next = Rc::new(next);
