@@ -30,6 +30,14 @@ TOGGLEABLE = {
 OPENABLE = {"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe", "Laptop"}
 # Of what opens, these stand open unless something closes them: nobody opens a box to fill it.
 USUALLY_OPEN = {"Box", "Laptop"}
+# Seen in recorded plans, against the recorded containment.
+ALSO_GOES_IN = {
+    "Knife": ["Fridge", "Microwave", "Cabinet", "GarbageCan"],
+    "ButterKnife": ["Fridge", "Microwave", "Cabinet", "GarbageCan"],
+    "CD": ["ArmChair"], "Glassbottle": ["GarbageCan"],
+    "TeddyBear": ["ArmChair", "Bed", "Desk", "Dresser", "Shelf", "Sofa"],
+    "ScrubBrush": ["Cabinet", "Cart", "CounterTop"],
+}
 # Fixed things that stand on or at another fixed thing, and what that may be.
 STANDS_ON = {
     "Faucet": ["SinkBasin", "BathtubBasin"],
@@ -83,15 +91,16 @@ NOT_ITS_NAME = {
     "Cloth": ["cloth wet", "wash cloth wet", "clothing", "clothes"],
     "CoffeeMachine": ["spout", "coffee makers spout", "coffee maker's spout"],
     "CoffeeTable": ["vase", "laptop", "credit card"],
-    "CounterTop": ["sink", "toaster", "knife", "coffee maker", "tomato", "bread", "table", "stove"],
+    "CounterTop": ["toaster", "knife", "coffee maker", "tomato", "bread", "table", "stove"],
     "CreditCard": ["credit"],
     "Cup": ["wine glasses", "glasses", "butter knife"],
     "Desk": ["cd", "laptop", "pencil"],
-    "DiningTable": ["bread", "loaf of bread", "apple", "salt shaker", "lettuce"],
+    "DiningTable": ["chair", "bread", "loaf of bread", "apple", "salt shaker", "lettuce"],
     "DishSponge": ["sponge wet", "object"],
     "Drawer": ["cell phone", "counter", "ladle", "sink"],
     "Dresser": ["credit card", "tv", "tv's base"],
     "Fridge": ["tomato", "knife", "lettuce", "microwave", "apple", "plate"],
+    "GarbageCan": ["toilet"],
     "KeyChain": ["of car keys"],
     "Lettuce": ["melon"],
     "Microwave": ["plate", "apple", "mug", "egg"],
@@ -104,7 +113,7 @@ NOT_ITS_NAME = {
     "SaltShaker": [],
     "Shelf": ["salt shaker", "mug", "roll", "plate", "counter", "cabinet", "self", "radiator cover",
               "shelves top shelf", "bench"],
-    "SideTable": ["microwave", "shelves", "lamp", "spoon", "low work table", "cabinet", "counter"],
+    "SideTable": ["microwave", "shelves", "lamp", "spoon", "low work table"],
     "SinkBasin": ["plate", "sponge", "egg", "counter", "drain"],
     "SoapBar": ["soap wet", "bar of soap wet", "sponge", "towel"],
     "Sofa": ["newspaper", "laptop", "box"],
@@ -244,8 +253,9 @@ ALSO_CALLED = {
     "TowelHolder": ["towel holder", "towel rack", "towel bar"],
     "Window": ["window", "window sill", "windowsill"],
 }
-# "Turn on the sink" means its faucet; the count keeps the basin ahead for everything else.
-COUNTED = {("Faucet", "sink"): 20, ("Faucet", "faucet"): 66, ("Faucet", "tap"): 14,
+# "Turn on the sink" means its faucet; the count keeps the basin ahead for everything else. Who puts
+# something on the edge of a sink means the counter, but only when no sink is there to be meant.
+COUNTED = {("CounterTop", "sink"): 30, ("Faucet", "sink"): 20, ("Faucet", "faucet"): 66, ("Faucet", "tap"): 14,
            ("Faucet", "water"): 60, ("Chair", "chair"): 20, ("Television", "tv"): 20,
            ("HandTowelHolder", "towel rack"): 5, ("Faucet", "kitchen sink"): 1}
 
@@ -305,10 +315,7 @@ def write_types(kinds, path):
         lines.append(f"number = {previous[name]}")
         lines.append(f"flags = {quoted(flag for flag, holds in flags if holds)}")
         goes_in = [place for place in facts.get("may_be_put_in") or [] if place in kinds]
-        if name == "TeddyBear":
-            goes_in = ["ArmChair", "Bed", "Desk", "Dresser", "Shelf", "Sofa"]
-        if name == "ScrubBrush":
-            goes_in = ["Cabinet", "Cart", "CounterTop"]
+        goes_in += ALSO_GOES_IN.get(name, [])
         if goes_in:
             lines.append(f"goes_in = {quoted(goes_in)}")
         if name in STANDS_ON:
@@ -366,7 +373,8 @@ def write_rooms(kinds, scenes, path):
 
 def write_names(kinds, path):
     """From a name to the types it may mean, with how often recorded people used it so; names
-    added by hand count once."""
+    added by hand count once. A name that is typical of one type also means another when it was used
+    so three times, and both can be carried or neither can: the rest names what stands nearby."""
     names = collections.defaultdict(dict)
     for kind, facts in kinds.items():
         recorded = dict((name, count) for name, count in facts.get("names") or [])
@@ -376,6 +384,12 @@ def write_names(kinds, path):
                 names[name][kind] = recorded.get(name, 1)
         for name in ALSO_CALLED.get(kind, []):
             names[name].setdefault(kind, recorded.get(name, 1))
+    for kind, facts in kinds.items():
+        for name, count in facts.get("names") or []:
+            alike = any(kinds[other]["pickupable"] == facts["pickupable"]
+                        for other in names.get(name, {}))
+            if alike and count >= 3 and name not in NOT_ITS_NAME.get(kind, []):
+                names[name].setdefault(kind, count)
     for (kind, name), count in COUNTED.items():
         names[name][kind] = count
     lines = [head("What people call things: name = { type = how often }.")]

@@ -109,6 +109,27 @@ impl SceneBuilder {
         Ok(id)
     }
 
+    /// Moves a thing that stands free into or onto another.
+    ///
+    /// - errors: it does not go there.
+    pub(super) fn place_in(&mut self, id: ObjectId, place: ObjectId) -> Result<(), BuildError> {
+        let (kind, under) = (self.scene.object(id.0).kind, self.scene.object(place.0).kind);
+        let around = self.scene.ancestors(place.0).any(|index| index == id.0);
+        if id == place || around || (!under.may_hold(kind) && !kind.may_stand_on(under)) {
+            return Err(BuildError(does_not_go(kind, under)));
+        }
+        self.scene.object_mut(id.0).parent = Some(place.0);
+        // What is in or on it moves along, in whatever order things were put together.
+        for index in 0..self.scene.objects.len() as Index {
+            if let Some(parent) = self.scene.object(index).parent {
+                let spot = spot_on(&self.scene, parent, index);
+                let object = self.scene.object_mut(index);
+                (object.x, object.y) = spot;
+            }
+        }
+        Ok(())
+    }
+
     /// - errors: it does not open.
     pub fn open(&mut self, id: ObjectId) -> Result<&mut SceneBuilder, BuildError> {
         self.set(id, State::Open, true)

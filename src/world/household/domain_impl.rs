@@ -105,18 +105,22 @@ impl Domain for Household {
             let kind = Kind::named(name.as_str())?;
             scene.of(kind).map(|i| (scene.shut_in(i).is_some(), scene.distance(i).0)).min()
         };
-        let mut here: Vec<((bool, i64), usize)> = mention
+        let mut here: Vec<(bool, (bool, i64), usize)> = mention
             .types
             .iter()
             .enumerate()
-            .filter_map(|(rank, name)| distance(name).map(|far| (far, rank)))
+            .filter_map(|(rank, name)| {
+                let rare = words::rarely_means(&self.lexicon, &mention.surface, name);
+                distance(name).map(|far| (rare, far, rank))
+            })
             .collect();
         if here.is_empty() {
             return mention.types.clone();
         }
-        // Of equally near kinds the one that people mean more often by the name.
+        // A meaning that hardly anybody has in mind waits until no other is here, however near it
+        // is. Of equally near kinds the one that people mean more often by the name.
         here.sort_unstable();
-        here.into_iter().map(|(_, rank)| mention.types[rank].clone()).collect()
+        here.into_iter().map(|(_, _, rank)| mention.types[rank].clone()).collect()
     }
 
     fn held(&self, scene: &Scene) -> Option<Symbol> {

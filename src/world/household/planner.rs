@@ -4,8 +4,8 @@
 //! **Why the answer is exact.** A step names kinds, and which instance it binds to depends on
 //! where the robot stands. So the search carries out real steps ([`act`]) on a smaller scene that
 //! keeps every instance of every *relevant* kind — what the task names, its appliances, what any
-//! instance of those is in or on, and what the hand holds — with everything around them and every
-//! free-standing thing. Steps on other kinds change nothing that the goal or a binding looks at,
+//! instance of those is in or on or, when it can be carried, contains, what the hand holds and where
+//! that can be put — with everything around them and every free-standing thing. Steps on other kinds change nothing that the goal or a binding looks at,
 //! with one exception: walking to another thing can change which instance is nearest. Those walks
 //! are tried too. What a relevant step does depends on relevant things only, so each step of the
 //! small scene does the same in the whole one, and no useful step is left out. Turning things on
@@ -26,14 +26,19 @@ use super::task_goal::achieved;
 use crate::language::Program;
 use crate::limits::PROGRAM_STEPS_MAX;
 
-/// Scenes looked at before the planner gives up.
-const NODES_MAX: usize = 60_000;
+/// Things in all scenes looked at, before the planner gives up: about 15,000 scenes of an ordinary
+/// room, fewer of a crowded one, so that no scene file can keep the planner busy for long.
+const THINGS_MAX: usize = 1_000_000;
 
 /// A program with the fewest primitives that achieves the task; empty programs do not exist, so a
-/// task that is already done has none. `None` also beyond [`NODES_MAX`] scenes or
+/// task that is already done has none. `None` also beyond [`THINGS_MAX`] or
 /// [`PROGRAM_STEPS_MAX`] steps.
 pub(super) fn plan(scene: &Scene, task: &Task) -> Option<Program> {
-    if matches!(task.goal, Goal::Free(_)) || achieved(scene, task) {
+    let missing = |kind: &Kind| scene.of(*kind).next().is_none();
+    if matches!(task.goal, Goal::Free(_))
+        || achieved(scene, task)
+        || task.needs().iter().any(missing)
+    {
         return None;
     }
     let search = Search::new(scene, task);
@@ -88,6 +93,7 @@ impl<'a> Search<'a> {
     }
 
     fn run(&self, start: Scene) -> Option<Vec<Action>> {
+        let nodes_max = THINGS_MAX / start.objects.len().max(1);
         let start = Rc::new(start);
         let mut nodes = vec![Node { scene: start.clone(), steps: 0, from: None }];
         let mut best: BTreeMap<Rc<Scene>, u32> = BTreeMap::from([(start.clone(), 0)]);
@@ -109,7 +115,7 @@ impl<'a> Search<'a> {
                 if best.get(&next).is_some_and(|known| *known <= steps + 1) {
                     continue;
                 }
-                if nodes.len() == NODES_MAX {
+                if nodes.len() >= nodes_max {
                     return None;
                 }
                 let next = Rc::new(next);
@@ -203,13 +209,11 @@ fn relevant(scene: &Scene, task: &Task) -> Vec<Kind> {
     if let Some(held) = scene.robot.holds {
         let held = scene.object(held).kind;
         mark(held);
-        // A hand that is full in the way has to be emptied somewhere.
-        if !task.needs().contains(&held) {
-            let places = scene.objects.iter().map(|object| object.kind);
-            places.filter(|place| place.may_hold(held)).for_each(|place| {
-                mark(place);
-            });
-        }
+        // Whatever it is, putting it down here and now may be the shortest way on.
+        let places = scene.objects.iter().map(|object| object.kind);
+        places.filter(|place| place.may_hold(held)).for_each(|place| {
+            mark(place);
+        });
     }
     if task.closed {
         let doors = scene.objects.iter().filter(|o| o.kind.has_door() && !o.shut());
@@ -217,15 +221,22 @@ fn relevant(scene: &Scene, task: &Task) -> Vec<Kind> {
             mark(door.kind);
         });
     }
-    // What a relevant thing is in or on matters too, and then all things of that kind.
+    // What a relevant thing is in or on matters too, and what a relevant thing that can be carried
+    // contains (it moves along, and can be walked to); then all things of those kinds.
+    let is = |wanted: &[bool], index: Index| wanted[usize::from(scene.object(index).kind.0)];
     loop {
-        let missing = (0..scene.objects.len() as Index)
-            .filter(|&index| wanted[usize::from(scene.object(index).kind.0)])
-            .flat_map(|index| scene.ancestors(index))
-            .map(|around| scene.object(around).kind)
-            .find(|kind| !wanted[usize::from(kind.0)]);
+        let missing = (0..scene.objects.len() as Index).find_map(|index| {
+            let inside = scene.ancestors(index).find(|&around| !is(&wanted, around));
+            let carried = |around: Index| scene.object(around).kind.pickupable();
+            if is(&wanted, index) {
+                inside
+            } else {
+                let around = |i: Index| is(&wanted, i) && carried(i);
+                scene.ancestors(index).any(around).then_some(index)
+            }
+        });
         match missing {
-            Some(kind) => wanted[usize::from(kind.0)] = true,
+            Some(index) => wanted[usize::from(scene.object(index).kind.0)] = true,
             None => break,
         }
     }

@@ -83,6 +83,10 @@ pub(super) fn read(text: &str) -> Result<Scene, StageError> {
                 return Err(at(on, "a thing has `in` or `on`, not both".to_owned()));
             }
             (Some(name), None) | (None, Some(name)) => {
+                if let Some(spot) = &thing.at {
+                    let reason = "a thing in or on another is where that is; leave out `at`";
+                    return Err(error(spot.span().start, reason.to_owned()));
+                }
                 let place = find(&builder, name.get_ref()).map_err(|r| at(name, r))?;
                 builder.put_kind(kind, place).map_err(|e| at(name, e.to_string()))?
             }

@@ -1,6 +1,7 @@
 //! Behaviour of the household, told in its own words.
 
 mod facts;
+mod matching;
 mod planner;
 mod primitives;
 mod speed;

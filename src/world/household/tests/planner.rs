@@ -166,15 +166,16 @@ fn the_planner_agrees_with_trying_everything() {
         "cool Apple CounterTop closed",
         "heat Mug DiningTable",
     ];
+    let depth = 7;
     let (mut solved, mut tried) = (0, 0);
-    for seed in 0..120 {
+    // The last two once showed a shorter way than the planner's.
+    for seed in (0..60).chain([1990, 3230]) {
         let mut random = Random::new(seed);
         let scene = tiny_scene(&mut random);
         let task: Task = random.pick(&tasks).unwrap().parse().unwrap();
         if achieved(&scene, &task) {
             continue;
         }
-        let depth = 9;
         let found = Household::new().plan(&scene, &task).map(|plan| plan.steps.len());
         let expected = brute_force(&scene, &task, depth);
         tried += 1;
@@ -184,6 +185,6 @@ fn the_planner_agrees_with_trying_everything() {
             None => assert!(found.is_none_or(|f| f > depth), "seed {seed}: {task}: {found:?}"),
         }
     }
-    println!("{tried} scenes, {solved} solved within 9 primitives");
-    assert!(solved >= 40, "only {solved} of {tried} scenes could be compared");
+    println!("{tried} scenes, {solved} solved within {depth} primitives");
+    assert!(solved >= 15, "only {solved} of {tried} scenes could be compared");
 }

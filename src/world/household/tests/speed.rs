@@ -1,6 +1,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use super::super::{Room, SceneBuilder};
 use super::{Household, run};
 use crate::language::{Document, Step};
 use crate::world::{Domain, Stage};
@@ -46,4 +47,29 @@ fn digest_step_and_planner_figures() {
     println!("document: {bytes} bytes");
     let mut scene = scene;
     run(&household, &mut scene, &task, &program.to_string()).unwrap();
+}
+
+#[test]
+fn a_crowd_of_things_does_not_overwhelm_the_planner() {
+    for (things, places, task, fewest) in [
+        (190, 200, "two Apple DiningTable", 9),
+        (130, 200, "nested Apple Bowl DiningTable", 7),
+        (385, 5, "heat Apple DiningTable closed", 15),
+    ] {
+        let mut builder = SceneBuilder::new(Room::Kitchen);
+        let fridge = builder.stand("Fridge").unwrap();
+        builder.stand("Microwave").unwrap();
+        for _ in 0..places {
+            builder.stand("DiningTable").unwrap();
+        }
+        for number in 0..things {
+            builder.put(if number % 3 == 1 { "Bowl" } else { "Apple" }, fridge).unwrap();
+        }
+        let scene = builder.build();
+        let start = Instant::now();
+        let plan = Household::new().plan(&scene, &task.parse().unwrap());
+        let steps = plan.map(|plan| plan.steps.len());
+        println!("{task} among {} things: {:?}", scene.objects.len(), start.elapsed());
+        assert_eq!(steps, Some(fewest), "{task}");
+    }
 }

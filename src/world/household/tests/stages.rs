@@ -143,6 +143,10 @@ fn a_scene_file_with_an_error_is_told_line_column_and_reason() {
     let (line, _, reason) = fails(&format!("{thing}states = [\"asleep\"]"));
     assert_eq!(line, 4);
     assert!(reason.contains("is no state; expected open, closed"), "{reason}");
+    let two = "[[thing]]\ntype = \"Desk\"\n[[thing]]\ntype = \"Pen\"\non = \"Desk\"\nat = [1, 2]";
+    let (line, column, reason) = fails(&format!("room = \"bedroom\"\n{two}"));
+    assert_eq!((line, column), (7, 6));
+    assert_eq!(reason, "a thing in or on another is where that is; leave out `at`");
     let (_, _, reason) = fails(&format!("{thing}states = [\"open\"]"));
     assert_eq!(reason, "a Mug cannot be open");
     let (line, _, reason) = fails("room = \"kitchen\"\ncolour = 1");

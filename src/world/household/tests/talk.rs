@@ -21,7 +21,13 @@ fn a_shared_name_means_what_is_nearest_and_here() {
     assert_eq!(household.resolve(&scene, &mention(&household, "table")), ["DiningTable"]);
     // Sink and faucet are at the same place: people mean the basin.
     run(&household, &mut scene, &task, "GOTO SinkBasin").unwrap();
-    assert_eq!(household.resolve(&scene, &mention(&household, "sink")), ["SinkBasin", "Faucet"]);
+    assert_eq!(
+        household.resolve(&scene, &mention(&household, "sink")),
+        ["SinkBasin", "Faucet", "CounterTop"]
+    );
+    // Hardly anybody calls a plate a bowl; but when there is no bowl, somebody may.
+    assert_eq!(household.resolve(&scene, &mention(&household, "bowl")), ["Plate"]);
+    assert_eq!(household.resolve(&scene, &mention(&household, "pan")), ["Plate"]);
     // Nothing of the name is here: the mention's own order, so that somebody can say so.
     assert_eq!(household.resolve(&scene, &mention(&household, "lamp")), ["DeskLamp", "FloorLamp"]);
 }
