@@ -395,7 +395,9 @@ fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Box<R
 
 fn defect(doing: &str, panic: &(dyn std::any::Any + Send)) -> Response {
     let words = life::panic_words(panic);
-    tracing::error!(doing, %words, "a defect; the actor is replaced by one from the log");
+    // The words of a panic may hold what a person said: they are for who looks closely.
+    tracing::error!(doing, "a defect; the actor is replaced by one from the log");
+    tracing::debug!(doing, %words, "what the defect said");
     Response::error(
         ErrorCode::Internal,
         format!(
