@@ -1,6 +1,7 @@
 //! The service from outside: real sockets, real actors, the real log.
 
 #[path = "support/toy.rs"]
+#[allow(dead_code)]
 mod toy;
 
 use std::thread;

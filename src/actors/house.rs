@@ -59,16 +59,16 @@ pub struct Front(Recipient<Submit>);
 /// A request that was not taken, given back.
 pub enum NotTaken {
     /// Too many are waiting.
-    Full(Submit),
+    Full(Box<Submit>),
     /// Nobody is there any more.
-    Closed(Submit),
+    Closed(Box<Submit>),
 }
 
 impl Front {
     pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
         self.0.try_send(submit).map_err(|error| match error {
-            SendError::Full(submit) => NotTaken::Full(submit),
-            SendError::Closed(submit) => NotTaken::Closed(submit),
+            SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
+            SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
         })
     }
 }

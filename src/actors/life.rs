@@ -81,7 +81,7 @@ impl<D: Domain> Life<D> {
             _open: open,
         });
         let address = trainer(life.clone());
-        life.trainer.set(address).ok().expect("it was just made and is set once");
+        assert!(life.trainer.set(address).is_ok(), "it was just made and is set once");
         life
     }
 }
@@ -144,9 +144,10 @@ pub(super) fn wake<D: Domain>(
     life: &Life<D>,
     stream: &StreamId,
     user: &UserId,
-) -> Result<Session<D>, Response> {
+) -> Result<Session<D>, Box<Response>> {
     let unavailable = |reason: String| {
-        Response::error(ErrorCode::Unavailable, format!("this session cannot be woken: {reason}"))
+        let message = format!("this session cannot be woken: {reason}");
+        Box::new(Response::error(ErrorCode::Unavailable, message))
     };
     // Never pushed out of the memory of minds for long: everybody begins with it.
     life.remember(&stream.tenant, life.base.clone());
@@ -169,7 +170,7 @@ pub(super) fn wake<D: Domain>(
     let durable = match life.log().append(stream, turn.after, turn.batch).wait() {
         Ok(durable) => durable,
         Err(error @ (AppendError::Busy { .. } | AppendError::Conflict { .. })) => {
-            return Err(Response::busy(error.to_string(), RETRY_WAKE_MS));
+            return Err(Box::new(Response::busy(error.to_string(), RETRY_WAKE_MS)));
         }
         Err(error) => {
             if matches!(error, AppendError::Poisoned { .. } | AppendError::Gone) {

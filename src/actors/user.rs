@@ -108,7 +108,7 @@ impl<D: Domain> UserActor<D> {
             Ask::Query(query) => match view(session, query) {
                 Ok(response) => answer.send(response),
                 Err(panic) => {
-                    answer.send(panic);
+                    answer.send(*panic);
                     self.leave();
                 }
             },
@@ -311,7 +311,8 @@ impl<D: Domain> Actor for UserActor<D> {
         let rebuilt = tokio::task::spawn_blocking(move || life::wake(&life, &stream, &user));
         ctx.wait(rebuilt.into_actor(self).map(|result, actor, ctx| {
             let woken = result.unwrap_or_else(|panic| {
-                Err(Response::error(ErrorCode::Internal, format!("waking failed: {panic}")))
+                let message = format!("waking failed: {panic}");
+                Err(Box::new(Response::error(ErrorCode::Internal, message)))
             });
             match woken {
                 Ok(session) => {
@@ -320,7 +321,7 @@ impl<D: Domain> Actor for UserActor<D> {
                 }
                 Err(response) => {
                     tracing::error!(stream = %actor.waking.stream, ?response, "cannot be woken");
-                    actor.leave_with(response);
+                    actor.leave_with(*response);
                 }
             }
         }));
@@ -376,8 +377,8 @@ fn respond(answer: Option<AnswerTo>, response: Response) {
     }
 }
 
-/// - errors: what to answer, and to leave with, when the session panicked.
-fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Response> {
+/// - errors: what to answer when the session panicked; it is then to be left.
+fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Box<Response>> {
     catch_unwind(AssertUnwindSafe(|| match query {
         Query::Status => Response::Status(session.status()),
         Query::Known => Response::Known(session.known()),
@@ -389,12 +390,14 @@ fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Respo
             }),
         },
     }))
-    .map_err(|panic| defect("looking", &*panic))
+    .map_err(|panic| Box::new(defect("looking", &*panic)))
 }
 
 fn defect(doing: &str, panic: &(dyn std::any::Any + Send)) -> Response {
     let words = life::panic_words(panic);
-    tracing::error!(doing, %words, "a defect; the actor is replaced by one from the log");
+    // The words of a panic may hold what a person said: they are for who looks closely.
+    tracing::error!(doing, "a defect; the actor is replaced by one from the log");
+    tracing::debug!(doing, %words, "what the defect said");
     Response::error(
         ErrorCode::Internal,
         format!(

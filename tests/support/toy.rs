@@ -14,9 +14,10 @@ use apprentice::world::{
     Domain, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
 };
 
-/// Bells ring until they are muted. Say `panic now` of a bell and the world breaks down, which is
-/// for tests of what the service makes of it.
+/// Bells ring until they are muted. Break one and the world panics, which is for tests of what the
+/// service makes of it; so is `brittle`, a world in which training a reranker panics.
 pub struct Bells {
+    brittle: bool,
     signature: Signature,
     lexicon: Lexicon,
     seeds: SeedSet,
@@ -43,6 +44,11 @@ fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
 }
 
 impl Bells {
+    /// A world in which training a reranker panics.
+    pub fn brittle() -> Bells {
+        Bells { brittle: true, ..Bells::new() }
+    }
+
     pub fn new() -> Bells {
         let operator = |name| Operator { name: Symbol::new(name), args: vec![Symbol::new("obj")] };
         let meaning = |kind: &str| Meaning { sort: "obj".into(), kind: kind.into(), count: 1 };
@@ -72,7 +78,7 @@ impl Bells {
             ],
         };
         let operators = ["RING", "MUTE", "BREAK"].map(operator).to_vec();
-        Bells { signature: Signature { operators }, lexicon, seeds }
+        Bells { brittle: false, signature: Signature { operators }, lexicon, seeds }
     }
 }
 
@@ -151,6 +157,7 @@ impl Domain for Bells {
         1
     }
     fn features(&self, scene: &Ringing, _: &Program) -> Vec<f32> {
+        assert!(!self.brittle, "the world is brittle");
         vec![scene.len() as f32 / 3.0]
     }
     fn digest(&self, scene: &Ringing) -> Digest {
