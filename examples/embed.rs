@@ -10,7 +10,7 @@ use apprentice::session::{OnClash, Told};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
 
-fn main() -> Result<(), Box<dyn Error>> {
+pub fn main() -> Result<(), Box<dyn Error>> {
     let service = Service::start(Config::new(Arc::new(Household::new()), Data::Memory))?;
     let robot = service.connect(UserId::new("ada")?)?;
 
