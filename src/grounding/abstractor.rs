@@ -155,7 +155,7 @@ impl Abstracted {
     }
 }
 
-/// The clause without "from the <obj>" phrases that come after another mention: "pick up the mug
+/// The clause without `from the <obj>` phrases that come after another mention: "pick up the mug
 /// from the table". `None` when it has none.
 pub fn without_locations(whole: &Clause) -> Option<Clause> {
     let words = &whole.lifted.words;

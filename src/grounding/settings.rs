@@ -8,7 +8,7 @@ pub struct Abstraction {
     pub adjectives: bool,
     /// Of two names side by side keep the last: "the desk lamp table".
     pub compounds: bool,
-    /// Also try the utterance without "from the <obj>": where a thing is, is often no argument.
+    /// Also try the utterance without `from the <obj>`: where a thing is, is often no argument.
     pub locations: bool,
     /// Keep the word of a typed fixture beside its slot: `<obj=sink>`.
     pub fixtures: bool,

@@ -32,7 +32,7 @@ pub fn core(program: &Program) -> Option<&Step> {
     }
 }
 
-/// - `gold`: a program with a [`core`].
+/// - `gold`: a program with a [`core()`].
 /// - returns: right when the answer is the core primitive with the right arguments and no other
 ///   manipulation; GOTO, and OPEN and CLOSE of the container, are free. Of a walk, the last
 ///   destination counts.

@@ -20,9 +20,19 @@ pub fn answers(program: &str, arguments: &[&str]) -> bool {
 ///
 /// - errors: a sentence with the command line and how it ended.
 pub fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
+    run_with(&[], program, arguments)
+}
+
+/// As [`run`], with more environment variables.
+pub fn run_with(
+    environment: &[(&str, &str)],
+    program: &str,
+    arguments: &[&str],
+) -> Result<(), String> {
     let line = format!("{program} {}", arguments.join(" "));
     let status = Command::new(program)
         .args(arguments)
+        .envs(environment.iter().copied())
         .current_dir(root())
         .status()
         .map_err(|error| format!("cannot run `{line}`: {error}"))?;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::budget::Budget;
-use crate::machine::{self, run};
+use crate::machine::{self, run, run_with};
 
 struct Stage {
     name: &'static str,
@@ -56,7 +56,12 @@ fn test() -> Result<(), String> {
 }
 
 fn docs() -> Result<(), String> {
-    run("cargo", &["doc", "--workspace", "--no-deps", "--quiet"])
+    // A link that leads nowhere is an error.
+    run_with(
+        &[("RUSTDOCFLAGS", "-D warnings")],
+        "cargo",
+        &["doc", "--workspace", "--no-deps", "--quiet"],
+    )
 }
 
 /// Advisories need a database that not every machine can reach: by hand, see `deny.toml`.

@@ -6,7 +6,7 @@ use crate::limits::SCENE_OBJECTS_MAX;
 ///
 /// Flat and without pointers, so that a clone is one copy of about ten bytes a thing. Lengths are
 /// centimetres from the room's south-west corner. Serialises with names
-/// ([`super::scene_text`]); reading that back validates.
+/// (`scene_text.rs`); reading that back validates.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Scene {
     pub(super) room: Room,
