@@ -262,6 +262,8 @@ const ROWS: usize = 500;
 /// Episodes of each seed in the slice.
 const EPISODES: usize = 4;
 const SEEDS: [u64; 3] = [1, 2, 3];
+/// Figures are written with four places.
+const ROUNDING: f64 = 0.0001;
 
 #[test]
 fn recorded_sentences_are_understood_no_worse_than_committed() {
@@ -289,7 +291,7 @@ fn recorded_sentences_are_understood_no_worse_than_committed() {
                 };
                 let lower = LOWER_IS_BETTER.contains(&name);
                 let fell = if lower { value - floor } else { floor - value };
-                if fell > allowed {
+                if fell > allowed + ROUNDING {
                     fallen.push(format!("{protocol} {recipe} {name}: {value:.4}, was {floor}"));
                 }
             }
