@@ -184,7 +184,8 @@ fn stage(tests: &Tests<'_>, row: &Row) -> Result<Scene, String> {
 }
 
 /// The taught sentence about other things: those of the room for which the program can be done,
-/// that have a plain name, and that cannot be mistaken for anything else in it.
+/// that have a plain name, and that cannot be mistaken for anything else in it. Empty when the
+/// sentence does not name its thing: there is nothing to replace.
 fn retold(tests: &Tests<'_>, number: usize, lesson: &Row) -> Vec<Row> {
     let handles = |operator: &str| operator == "PICKUP" || operator == "PUT";
     let handled = lesson.program.steps.iter().find(|step| handles(step.operator.as_str()));
@@ -200,11 +201,9 @@ fn retold(tests: &Tests<'_>, number: usize, lesson: &Row) -> Vec<Row> {
     let mut rng = draw::rng(tests.seed, &["other things", &number.to_string()]);
     rng.shuffle(&mut others);
     let retell = |other: &Symbol| {
-        let renamed = rename(lexicon, &lesson.sentence, thing, names[other]);
         let row = Row {
             id: format!("{} about {other}", lesson.id),
-            // A sentence that does not name its thing ("heat it") is said of any thing.
-            sentence: renamed.unwrap_or_else(|| lesson.sentence.clone()),
+            sentence: rename(lexicon, &lesson.sentence, thing, names[other])?,
             program: replace(&lesson.program, thing, other),
             ..lesson.clone()
         };
