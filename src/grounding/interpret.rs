@@ -1,11 +1,11 @@
 use super::abstractor::{Abstractor, without_locations};
-use super::combine::{Candidate, Offer, Verdict, combine};
+use super::combine::{Candidate, Context, Offer, Verdict, combine};
 use super::moment::Moment;
 use super::reranker::Reranker;
 use super::resolver::resolve;
 use super::settings::{Abstraction, Execution};
 use crate::language::{
-    Answer, Clause, Discarded, Evidence, LiftedUtterance, Near, Outcome, Symbol, Utterance,
+    Answer, Clause, Discarded, Evidence, Grammar, LiftedUtterance, Near, Outcome, Symbol, Utterance,
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
 use crate::parser::{Parse, SemanticParser};
@@ -33,17 +33,18 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
         let offers = heard.deciding();
-        let candidates = self.ground(moment, &offers);
+        let candidates = self.ground(moment, &offers, heard.threshold());
         let feasible = feasible(&candidates);
         let exact = heard.exact();
         // A seed keeps its own program even when a lesson with the same words has another one.
         let seeded = feasible.iter().find(|candidate| exact && candidate.seed);
         let (chosen, reranked) = match (self.reranker, seeded) {
             (_, Some(seeded)) => (Some(*seeded), 0),
-            (Some(reranker), None) if feasible.len() > 1 => {
+            (Some(reranker), None) if self.rivals(&feasible) > 1 => {
                 let words = utterance.tokens();
-                let best = reranker.best(moment, &words, feasible.iter().map(|c| &c.program));
-                (Some(feasible[best]), feasible.len() as u32)
+                let rivals = &feasible[..self.rivals(&feasible)];
+                let best = reranker.best(moment, &words, rivals.iter().map(|c| &c.program));
+                (Some(rivals[best]), rivals.len() as u32)
             }
             _ => (feasible.first().copied(), 0),
         };
@@ -69,15 +70,27 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         utterance: &Utterance,
     ) -> Vec<Candidate> {
         let heard = self.hear(moment, utterance, Ways::All);
-        let all = self.ground(moment, &heard.all());
+        let all = self.ground(moment, &heard.all(), heard.threshold());
         feasible(&all).into_iter().cloned().collect()
+    }
+
+    /// How many of the feasible candidates, from the first, the reranker chooses from.
+    fn rivals(&self, feasible: &[&Candidate]) -> usize {
+        match feasible.first() {
+            Some(first) if self.parser.sure_of_order() => {
+                feasible.iter().take_while(|c| c.distance <= first.distance && c.exact).count()
+            }
+            _ => feasible.len(),
+        }
     }
 
     fn hear<D: Domain>(&self, moment: &Moment<'_, D>, said: &Utterance, ways: Ways) -> Heard {
         let lexicon = moment.domain.lexicon();
         let abstracted = Abstractor::new(lexicon, self.abstraction, self.known).read(said);
+        let grammar = self.abstraction.lists.as_ref();
+        let grammar = grammar.map(|lists| Grammar { lists, adjectives: &lexicon.adjectives });
         let whole = self.listen(abstracted.whole());
-        let parts = match abstracted.clauses(self.abstraction.split) {
+        let parts = match abstracted.clauses(self.abstraction.split, grammar) {
             // An exact match of the whole needs no second opinion from its parts.
             Some(parts) if !whole.exact() || ways == Ways::All => parts,
             _ => Vec::new(),
@@ -102,12 +115,18 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         &self,
         moment: &Moment<'_, D>,
         ways: &[Vec<Vec<Offer<'_>>>],
+        threshold: f32,
     ) -> Vec<Candidate> {
+        let lists = self.abstraction.lists.as_ref();
+        let chain = |so_far, next| self.parser.chain(so_far, next);
+        let context = Context { execution: self.execution, lists, chain: &chain };
         let mut all: Vec<Candidate> =
-            ways.iter().flat_map(|clauses| combine(moment, self.execution, clauses)).collect();
+            ways.iter().flat_map(|clauses| combine(moment, &context, clauses)).collect();
         // Stable: at equal distance the whole utterance comes before its parts, and within each
         // the older exemplar first.
         all.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        // A chain of clauses that are near enough one by one may not be.
+        all.retain(|candidate| candidate.distance <= threshold);
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in all {
             if kept.len() < CANDIDATES_MAX && kept.iter().all(|k| k.program != candidate.program) {
@@ -146,6 +165,7 @@ impl ParsedClause {
                 program: scored.program.clone(),
                 distance: scored.distance,
                 exact: place < parse.exact,
+                open: scored.open,
                 seed: scored.number < seeds,
             }));
         }
@@ -199,6 +219,10 @@ impl Heard {
         if self.parts_exact() { vec![parts] } else { vec![whole, parts] }
     }
 
+    fn threshold(&self) -> f32 {
+        self.whole.readings[0].1.threshold
+    }
+
     /// Every way of reading the utterance.
     fn all(&self) -> Vec<Vec<Vec<Offer<'_>>>> {
         let parts = self.parts.iter().map(|part| part.offers(self.seeds)).collect();
@@ -240,7 +264,7 @@ impl Heard {
                 nearest.push(near.clone());
             }
         }
-        let threshold = self.whole.readings[0].1.threshold;
+        let threshold = self.threshold();
         Evidence { lifted, nearest, threshold, ..Evidence::default() }
     }
 }

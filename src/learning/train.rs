@@ -30,7 +30,7 @@ pub fn train<D: Domain>(
     let mut exemplars = seeds.exemplars.clone();
     exemplars.extend(lessons.iter().map(|lesson| lift(domain, recipe, lesson)));
 
-    let (parser, figures) = AnyParser::train(recipe, seed(recipe, "parser"), &exemplars, seeds)?;
+    let (parser, figures) = AnyParser::train(recipe, domain, seed(recipe, "parser"), &exemplars)?;
     seeds_keep_their_programs(&parser, &seeds.exemplars, lessons)?;
     let report =
         Report { exemplars: exemplars.len() as u32, threshold: parser.threshold(), figures };
