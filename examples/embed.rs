@@ -10,7 +10,7 @@ use apprentice::session::{OnClash, Told};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
 
-fn main() -> Result<(), Box<dyn Error>> {
+pub fn main() -> Result<(), Box<dyn Error>> {
     let service = Service::start(Config::new(Arc::new(Household::new()), Data::Memory))?;
     let robot = service.connect(UserId::new("ada")?)?;
 
@@ -19,15 +19,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         robot.say(utterance)?;
     }
     robot.say("put the mug in the sink")?;
-    let lesson = robot.status()?.to_teach.remove(0);
-    robot.teach(lesson.seq, vec![1, 2, 3, 4], OnClash::Ask)?;
+    let mut status = robot.status()?;
+    let lesson = status.to_teach.remove(0);
+    let actions = status.actions.iter().map(|action| action.number).collect();
+    robot.teach(lesson.seq, actions, OnClash::Ask)?;
     robot.finish_teaching()?;
     robot.wait_until_learned(Duration::from_secs(60))?;
 
     robot.start(Stage::Task { task: "place Tomato SinkBasin".to_owned(), seed: 8 })?;
     for told in robot.say("tidy the tomato")?.told {
-        if let Told::Answered { utterance, answer, .. } = told {
-            println!("{utterance}: {:?}", answer.outcome);
+        if let Told::Answered { answer, .. } = told {
+            println!("{:?}", answer.outcome);
         }
     }
     service.stop()?;

@@ -27,3 +27,4 @@ pub mod actors;
 pub mod cli;
 pub mod frontends;
 pub mod service;
+pub mod study;

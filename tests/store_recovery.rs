@@ -88,8 +88,8 @@ fn nothing_acknowledged_is_lost_when_the_process_is_killed() {
                 && digest.len() == 64
             {
                 acknowledged.insert((key.to_owned(), seq.parse().unwrap()), digest.to_owned());
+                wanted = wanted.saturating_sub(1);
             }
-            wanted = wanted.saturating_sub(1);
             if wanted == 0 {
                 // The lines that were on their way are still read: they were promises too.
                 child.kill().unwrap();

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{converse, log, serve, talk, transcript};
+use super::{converse, eval, log, serve, talk, transcript};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -44,6 +44,7 @@ enum Verb {
     Serve(serve::Arguments),
     Talk(talk::Arguments),
     Transcript(transcript::Arguments),
+    Eval(eval::Arguments),
     Log(log::Arguments),
 }
 
@@ -68,6 +69,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Serve(arguments)) => serve::run(arguments),
         Some(Verb::Talk(arguments)) => talk::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
+        Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
     }
 }

@@ -4,6 +4,7 @@ mod args;
 mod converse;
 mod data_dir;
 mod embedded;
+mod eval;
 mod failure;
 mod log;
 mod logging;

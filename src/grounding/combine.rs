@@ -52,8 +52,9 @@ pub struct Candidate {
 pub enum Verdict {
     /// It runs; per step the things it acts on.
     Runs { bindings: Vec<Vec<String>> },
-    /// The words make sense and the world forbids the 0-based `step`.
-    Forbidden { step: u32, reason: String },
+    /// The words make sense and the world forbids the 0-based `step`. `mendable`: another step
+    /// first, such as going there, would allow it.
+    Forbidden { step: u32, reason: String, mendable: bool },
     /// The words do not fill the program.
     Unfilled { reason: String },
 }
@@ -157,11 +158,12 @@ impl<D: Domain> Ground<'_, D> {
         for types in choices(&referents.types, &offer.program) {
             let filled = fill(&offer.program, &offer.clause.mentions, &types, held.as_ref());
             let next = self.try_filled(partial, offer, filled, named_last(&types, before));
-            let runs = matches!(next.candidate.verdict, Verdict::Runs { .. });
-            if runs {
-                return next;
-            }
-            first.get_or_insert(next);
+            match next.candidate.verdict {
+                Verdict::Runs { .. } => return next,
+                // "The counter" across the room does not come to mean the table beside the robot.
+                Verdict::Forbidden { mendable: true, .. } if first.is_none() => return next,
+                _ => first.get_or_insert(next),
+            };
         }
         first.expect("there is always the choice of every mention's best type")
     }
@@ -193,8 +195,10 @@ impl<D: Domain> Ground<'_, D> {
             let named = ground.steps.last().and_then(|step| step.args.first()).cloned();
             let mentioned = named.or_else(|| mentioned.clone());
             let next = self.try_filled(partial, &further, program(ground), mentioned);
-            if matches!(next.candidate.verdict, Verdict::Runs { .. }) {
-                return next;
+            match next.candidate.verdict {
+                Verdict::Runs { .. } => return next,
+                Verdict::Forbidden { mendable: true, .. } if first.is_none() => return next,
+                _ => {}
             }
             first.get_or_insert(next);
         }
@@ -217,12 +221,9 @@ impl<D: Domain> Ground<'_, D> {
                 Some(Missing::Slot { reason }) => Some(Verdict::Unfilled { reason }),
                 Some(Missing::Meaning { step, reason }) => {
                     let step = (steps.len() + step) as u32;
-                    Some(Verdict::Forbidden { step, reason })
+                    Some(Verdict::Forbidden { step, reason, mendable: false })
                 }
-                None => self
-                    .run(&mut scene, &mut steps, bindings, offer, &filled.program)
-                    .err()
-                    .map(|(step, reason)| Verdict::Forbidden { step, reason }),
+                None => self.run(&mut scene, &mut steps, bindings, offer, &filled.program).err(),
             };
             if let Some(failed) = failed {
                 verdict = failed;
@@ -258,7 +259,7 @@ impl<D: Domain> Ground<'_, D> {
 
     /// Carries the steps out on the copy of the scene.
     ///
-    /// - errors: the 0-based step, counted over the whole program, and the reason.
+    /// - errors: [`Verdict::Forbidden`], its step counted over the whole program.
     fn run(
         &self,
         scene: &mut D::Scene,
@@ -266,7 +267,7 @@ impl<D: Domain> Ground<'_, D> {
         bindings: &mut Vec<Vec<String>>,
         offer: &Offer<'_>,
         program: &Program,
-    ) -> Result<(), (u32, String)> {
+    ) -> Result<(), Verdict> {
         let (domain, task) = (self.moment.domain, self.moment.task);
         let before = steps.len();
         let contradicted = |scene: &D::Scene, from: usize| {
@@ -275,17 +276,22 @@ impl<D: Domain> Ground<'_, D> {
                 return None;
             }
             let (step, reason) = domain.contradiction(scene, &offer.clause.words, &rest)?;
-            Some(((before + from + step) as u32, reason))
+            let step = (before + from + step) as u32;
+            Some(Verdict::Forbidden { step, reason, mendable: false })
         };
         if let Some(contradiction) = contradicted(scene, 0) {
             return Err(contradiction);
         }
         for (index, step) in program.steps.iter().enumerate() {
-            let refused = |reason| ((before + index) as u32, reason);
+            let refused = |reason, mendable| Verdict::Forbidden {
+                step: (before + index) as u32,
+                reason,
+                mendable,
+            };
             if steps.len() >= PROGRAM_STEPS_MAX {
-                return Err(refused("the program is too long".to_owned()));
+                return Err(refused("the program is too long".to_owned(), false));
             }
-            domain.signature().check(step).map_err(refused)?;
+            domain.signature().check(step).map_err(|reason| refused(reason, false))?;
             let mut unasked = 0;
             let bound = loop {
                 let refusal = match domain.step(scene, task, step) {
@@ -299,11 +305,13 @@ impl<D: Domain> Ground<'_, D> {
                 if offer.open && program.steps.len() > 1 && means && refusal.first.is_none() {
                     break None;
                 }
+                let mendable = refusal.first.is_some();
                 let first = refusal.first.filter(|_| self.context.execution.approach);
                 let Some(first) = first.filter(|_| unasked < UNASKED_STEPS_MAX) else {
-                    return Err(refused(refusal.reason));
+                    return Err(refused(refusal.reason, mendable));
                 };
-                let bound = domain.step(scene, task, &first).map_err(|e| refused(e.reason))?;
+                let bound =
+                    domain.step(scene, task, &first).map_err(|e| refused(e.reason, false))?;
                 steps.push(first);
                 bindings.push(bound);
                 unasked += 1;

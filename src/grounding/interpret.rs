@@ -277,7 +277,7 @@ fn outcome_of(candidate: &Candidate) -> Outcome {
     let program = candidate.program.clone();
     match &candidate.verdict {
         Verdict::Runs { bindings } => Outcome::Understood { program, bindings: bindings.clone() },
-        Verdict::Forbidden { step, reason } => {
+        Verdict::Forbidden { step, reason, .. } => {
             Outcome::Impossible { program, step: *step, reason: reason.clone() }
         }
         Verdict::Unfilled { .. } => Outcome::NotSure,

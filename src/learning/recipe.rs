@@ -131,6 +131,16 @@ impl Recipe {
         Ok(Recipe { name, settings, words, digest })
     }
 
+    /// The same settings under another digest, and so with another training seed. For
+    /// evaluations, which have to tell a method's strength from one training's luck; no person's
+    /// mind is ever trained with it.
+    pub fn reseeded(&self, seed: u64) -> Recipe {
+        let mut hasher = blake3::Hasher::new_derive_key("apprentice 2026 evaluation seed");
+        hasher.update(&self.digest.0);
+        hasher.update(&seed.to_be_bytes());
+        Recipe { digest: Digest(*hasher.finalize().as_bytes()), ..self.clone() }
+    }
+
     pub fn name(&self) -> &str {
         &self.name
     }

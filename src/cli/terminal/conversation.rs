@@ -111,7 +111,7 @@ impl<'a> Conversation<'a> {
         }
         if self.screen.style() == Style::Screen {
             let view = self.robot.look().map_err(Failure::failed)?;
-            self.tell(&view.summary)?;
+            self.tell_one(&print::summary(&view))?;
         }
         Ok(Flow::On)
     }
@@ -292,7 +292,7 @@ impl<'a> Conversation<'a> {
         match result {
             Ok(value) => Ok(Some(value)),
             Err(ClientError::Rejected { message, .. }) => {
-                self.tell_one(&capitalised(&message))?;
+                self.tell_one(&print::sentence(&message))?;
                 Ok(None)
             }
             Err(broken) => Err(Failure::failed(broken)),
@@ -312,14 +312,6 @@ impl<'a> Conversation<'a> {
         self.screen.report(lines).map_err(unwritable)?;
         Ok(Flow::On)
     }
-}
-
-/// A refusal as a sentence of its own.
-pub(super) fn capitalised(sentence: &str) -> String {
-    let mut chars = sentence.chars();
-    let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-    let stop = if sentence.ends_with('.') { "" } else { "." };
-    format!("{first}{}{stop}", chars.as_str())
 }
 
 pub(super) fn unwritable(error: io::Error) -> Failure {

@@ -1,5 +1,8 @@
-use std::io::{self, BufRead};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
+use std::thread;
+use std::time::Duration;
 
 use rustyline::error::ReadlineError;
 use rustyline::history::FileHistory;
@@ -30,44 +33,93 @@ pub trait Lines {
     }
 }
 
-/// Lines from a file or a pipe.
-pub struct PipedLines<R> {
-    input: R,
+/// How long the end of a pipe may take to show itself when nothing is left to read. A file's end
+/// is known at once; a program at the other end that waits for us waits this much longer.
+const END_SHOWS: Duration = Duration::from_millis(250);
+/// Bytes of one read, and reads that wait to be used: a fast writer waits for us, not in memory.
+const CHUNK_BYTES: usize = 16 * 1024;
+const CHUNKS_WAITING: usize = 4;
+
+/// Lines from a file or a pipe, read ahead on a thread of their own: whether the input has ended
+/// can then be asked without waiting for a writer that waits for us.
+pub struct PipedLines {
+    chunks: Receiver<io::Result<Vec<u8>>>,
+    /// What was received and not yet used.
+    chunk: Vec<u8>,
+    used: usize,
+    ended: bool,
 }
 
-impl<R: BufRead> PipedLines<R> {
-    pub fn new(input: R) -> PipedLines<R> {
-        PipedLines { input }
+impl PipedLines {
+    pub fn new(input: impl Read + Send + 'static) -> PipedLines {
+        let (sender, chunks) = mpsc::sync_channel(CHUNKS_WAITING);
+        // Never joined: it ends with the input, or with the process.
+        thread::spawn(move || read_ahead(input, &sender));
+        PipedLines { chunks, chunk: Vec::new(), used: 0, ended: false }
+    }
+
+    /// The bytes received and not yet used; waits for some until `limit`, or as long as it takes.
+    ///
+    /// - returns: none at the end of input, and when there was nothing within `limit`.
+    fn available(&mut self, limit: Option<Duration>) -> io::Result<Option<&[u8]>> {
+        while self.used == self.chunk.len() {
+            if self.ended {
+                return Ok(None);
+            }
+            let received = match limit {
+                None => self.chunks.recv().map_err(|_| RecvTimeoutError::Disconnected),
+                Some(limit) => self.chunks.recv_timeout(limit),
+            };
+            match received {
+                Ok(chunk) => (self.chunk, self.used) = (chunk?, 0),
+                Err(RecvTimeoutError::Disconnected) => self.ended = true,
+                Err(RecvTimeoutError::Timeout) => return Ok(None),
+            }
+        }
+        Ok(Some(&self.chunk[self.used..]))
     }
 }
 
-impl<R: BufRead> Lines for PipedLines<R> {
+/// Sends what it reads until the input ends, fails, or nobody listens.
+fn read_ahead(mut input: impl Read, sender: &SyncSender<io::Result<Vec<u8>>>) {
+    let mut buffer = vec![0; CHUNK_BYTES];
+    loop {
+        let read = match input.read(&mut buffer) {
+            Ok(0) => return,
+            Ok(count) => Ok(buffer[..count].to_vec()),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => Err(error),
+        };
+        let failed = read.is_err();
+        if sender.send(read).is_err() || failed {
+            return;
+        }
+    }
+}
+
+impl Lines for PipedLines {
     fn read(&mut self, _prompt: &str) -> io::Result<Typed> {
         let mut bytes = Vec::new();
-        let mut dropped = 0;
-        loop {
-            let chunk = self.input.fill_buf()?;
-            if chunk.is_empty() {
-                if bytes.is_empty() {
-                    return Ok(Typed::End);
-                }
-                break;
-            }
-            let newline = chunk.iter().position(|&byte| byte == b'\n');
-            let taken = newline.unwrap_or(chunk.len());
+        let (mut found, mut started) = (0, false);
+        while let Some(available) = self.available(None)? {
+            started = true;
+            let newline = available.iter().position(|&byte| byte == b'\n');
+            let taken = newline.unwrap_or(available.len());
             let kept = taken.min(LINE_BYTES_MAX - bytes.len());
-            bytes.extend_from_slice(&chunk[..kept]);
-            dropped += taken - kept;
-            self.input.consume(taken + usize::from(newline.is_some()));
+            bytes.extend_from_slice(&available[..kept]);
+            found += taken;
+            self.used += taken + usize::from(newline.is_some());
             if newline.is_some() {
                 break;
             }
         }
-        if dropped > 0 {
-            let found = bytes.len() + dropped;
+        if !started {
+            return Ok(Typed::End);
+        }
+        if found > bytes.len() {
             let max = crate::limits::UTTERANCE_BYTES_MAX;
             return Ok(Typed::Unreadable(format!(
-                "that line has {found} bytes; at most {max} are read, so say it in parts"
+                "That line has {found} bytes; at most {max} are read, so say it in parts."
             )));
         }
         Ok(match String::from_utf8(bytes) {
@@ -76,7 +128,7 @@ impl<R: BufRead> Lines for PipedLines<R> {
                 let at = error.utf8_error().valid_up_to();
                 let byte = error.as_bytes()[at];
                 Typed::Unreadable(format!(
-                    "that line is not UTF-8 text: byte 0x{byte:02x} at position {}; type plain text",
+                    "That line is not UTF-8 text: byte 0x{byte:02x} at position {}; type plain text.",
                     at + 1
                 ))
             }
@@ -84,7 +136,8 @@ impl<R: BufRead> Lines for PipedLines<R> {
     }
 
     fn at_end(&mut self) -> io::Result<bool> {
-        Ok(self.input.fill_buf()?.is_empty())
+        let nothing = self.available(Some(END_SHOWS))?.is_none();
+        Ok(nothing && self.ended)
     }
 }
 
@@ -132,7 +185,7 @@ impl Lines for EditedLines {
 mod tests {
     use super::*;
 
-    fn read_all(bytes: &[u8]) -> Vec<Typed> {
+    fn read_all(bytes: &'static [u8]) -> Vec<Typed> {
         let mut lines = PipedLines::new(bytes);
         let mut read = Vec::new();
         loop {
@@ -164,9 +217,22 @@ mod tests {
     fn an_enormous_line_is_counted_and_not_kept() {
         let mut bytes = vec![b'a'; 3_000_000];
         bytes.extend_from_slice(b"\nnext\n");
-        let read = read_all(&bytes);
+        let read = read_all(bytes.leak());
         let Typed::Unreadable(sentence) = &read[0] else { panic!("{:?}", read[0]) };
         assert!(sentence.contains("3000000 bytes"), "{sentence}");
         assert_eq!(read[1], Typed::Line("next".into()));
+    }
+
+    #[test]
+    fn a_writer_that_waits_for_us_is_not_waited_for() {
+        let (reader, mut writer) = io::pipe().unwrap();
+        let mut lines = PipedLines::new(reader);
+        assert!(!lines.at_end().unwrap());
+        io::Write::write_all(&mut writer, b"go\n").unwrap();
+        assert!(!lines.at_end().unwrap());
+        assert_eq!(lines.read("").unwrap(), Typed::Line("go".into()));
+        drop(writer);
+        assert_eq!(lines.read("").unwrap(), Typed::End);
+        assert!(lines.at_end().unwrap());
     }
 }

@@ -34,16 +34,14 @@ pub fn talk(
     history: Option<&Path>,
 ) -> Result<(), Failure> {
     let stages = Stages::new(seed.unwrap_or_else(made_up_seed), tasks);
-    let (mut stdin, mut stdout) = (io::stdin().lock(), io::stdout().lock());
-    if !stdin.is_terminal() {
-        let mut lines = PipedLines::new(&mut stdin);
+    let mut stdout = io::stdout();
+    if !io::stdin().is_terminal() {
+        let mut lines = PipedLines::new(io::stdin());
         let screen = Screen::new(&mut stdout, Style::Lines);
         return converse(client, &mut lines, screen, stages);
     }
-    drop((stdin, stdout));
     let mut lines = EditedLines::new(history)
         .map_err(|error| Failure::failed(format!("this terminal cannot be used: {error}")))?;
-    let mut stdout = io::stdout();
     let screen = Screen::new(&mut stdout, Style::Screen);
     converse(client, &mut lines, screen, stages)
 }

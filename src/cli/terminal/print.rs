@@ -83,9 +83,14 @@ pub fn holding(view: &View) -> String {
     }
 }
 
-/// `:look`: the room in sentences, then what stands where.
+/// The room, where the robot is and what it holds, as one sentence.
+pub fn summary(view: &View) -> String {
+    sentence(&one_line(&view.summary))
+}
+
+/// `:look`: the room in a sentence, then what stands where.
 pub fn look(view: &View) -> Vec<String> {
-    let mut lines = view.summary.clone();
+    let mut lines = vec![summary(view)];
     let mut places: Vec<&str> = Vec::new();
     for place in view.things.iter().filter_map(|thing| thing.place.as_deref()) {
         if !places.contains(&place) {
@@ -274,9 +279,11 @@ Say which actions the utterance stood for:
 pub fn one_line(lines: &[String]) -> String {
     let mut joined = String::new();
     for line in lines.iter().map(|line| line.trim()) {
+        let starts_sentence = line.starts_with(char::is_uppercase);
         let gap = match joined.chars().last() {
             None => "",
             Some('.' | ':' | '!' | '?') => " ",
+            Some(_) if starts_sentence => ". ",
             Some(_) => "; ",
         };
         joined.push_str(gap);
@@ -304,6 +311,14 @@ pub fn welcome(user: &str, status: &Status) -> String {
         Phase::Idle | Phase::Closed => "",
     };
     format!("Welcome back, {user}: {} so far, {lessons}{now}.", count(status.episodes, "task"))
+}
+
+/// A clause as a sentence of its own: with a capital and a full stop.
+pub fn sentence(clause: &str) -> String {
+    let mut chars = clause.chars();
+    let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    let stop = if clause.ends_with('.') { "" } else { "." };
+    format!("{first}{}{stop}", chars.as_str())
 }
 
 /// `1 action`, `2 actions`.
@@ -421,7 +436,7 @@ mod tests {
             states: states.iter().map(|state| (*state).to_owned()).collect(),
         };
         let view = View {
-            summary: vec!["You are in a kitchen.".into()],
+            summary: vec!["this is a kitchen".into(), "its hand is empty".into()],
             things: vec![
                 thing("CounterTop", None, &[]),
                 thing("Mug", Some("CounterTop"), &["dirty"]),
@@ -433,7 +448,7 @@ mod tests {
         assert_eq!(
             look(&view),
             [
-                "You are in a kitchen.",
+                "This is a kitchen; its hand is empty.",
                 "  CounterTop: Mug (dirty), SinkBasin",
                 "  SinkBasin: Fork",
                 "  Apple (held)"
@@ -480,8 +495,8 @@ mod tests {
 
     #[test]
     fn several_lines_become_one_without_losing_their_ends() {
-        let lines = ["Which?".to_owned(), "  1  a".to_owned(), "  2  b".to_owned()];
-        assert_eq!(one_line(&lines), "Which? 1  a; 2  b");
+        let lines = ["What I did:", "  1  a", "  2  b", "Which was it?"].map(str::to_owned);
+        assert_eq!(one_line(&lines), "What I did: 1  a; 2  b. Which was it?");
     }
 
     #[test]

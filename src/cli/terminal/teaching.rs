@@ -1,4 +1,4 @@
-use super::conversation::{Conversation, Flow, capitalised, unreadable};
+use super::conversation::{Conversation, Flow, unreadable};
 use super::input::{self, ClashLine, Command, TeachLine};
 use super::lines::Typed;
 use super::print;
@@ -48,7 +48,7 @@ impl Conversation<'_> {
             TeachLine::Command(Command::Done) => self.finish_teaching(),
             TeachLine::Command(Command::Help) => self.tell(&print::teaching_help()),
             TeachLine::Command(command) => self.command(command),
-            TeachLine::Bad(sentence) => self.tell_one(&capitalised(&sentence)),
+            TeachLine::Bad(sentence) => self.tell_one(&print::sentence(&sentence)),
         }
     }
 
@@ -74,7 +74,7 @@ impl Conversation<'_> {
         sentence: &str,
     ) -> Result<Flow, Failure> {
         loop {
-            self.tell_one(&capitalised(sentence))?;
+            self.tell_one(&print::sentence(sentence))?;
             let text = match self.lines.read("replace, keep or cancel> ").map_err(unreadable)? {
                 Typed::End => return Ok(Flow::Quit),
                 Typed::Unreadable(sentence) => {
@@ -88,7 +88,7 @@ impl Conversation<'_> {
                 Ok(ClashLine::Replace) => OnClash::Replace,
                 Ok(ClashLine::Keep) => OnClash::Keep,
                 Err(sentence) => {
-                    self.tell_one(&capitalised(&sentence))?;
+                    self.tell_one(&print::sentence(&sentence))?;
                     continue;
                 }
             };

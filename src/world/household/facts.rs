@@ -333,6 +333,11 @@ impl Room {
         }
     }
 
+    /// The kinds of things that recorded rooms of this kind have, in a fixed order.
+    pub fn kinds(self) -> impl Iterator<Item = Kind> {
+        facts().room(self).things.iter().map(|thing| thing.kind)
+    }
+
     /// Reads the key, or the same with a blank, a hyphen or nothing for the underscore.
     pub fn read(text: &str) -> Option<Room> {
         let bare = |text: &str| text.to_lowercase().replace(['_', ' ', '-'], "");

@@ -1,0 +1,200 @@
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+use super::failure::Failure;
+use super::recipe;
+use crate::learning::Recipe;
+use crate::study::corpus::{BadLine, Corpus};
+use crate::study::goals::goals;
+use crate::study::one_shot::one_shot;
+use crate::study::parallel::Progress;
+use crate::study::people::People;
+use crate::study::primitives::primitives;
+use crate::study::report::Setting;
+
+/// Bad lines shown; all are counted.
+const BAD_LINES_SHOWN: usize = 5;
+/// The seeds that run when none is named.
+const SEEDS: [u64; 3] = [1, 2, 3];
+/// Episodes and rows of one seed, at most: what a slip of the finger should not start.
+const LIMIT_MAX: u64 = 1_000_000;
+
+/// Measure how much of recorded human sentences is understood.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice eval --corpus utterances.jsonl.gz --protocol primitives
+  apprentice eval --corpus utterances.jsonl.gz --protocol one-shot --recipe paper --limit 6
+  apprentice eval --corpus goals.jsonl.gz --protocol goals --seed 1 --json
+
+docs/evaluation.md describes the corpus, the protocols and every figure.
+
+Exit codes: 0 the figures are on standard output; 1 a training failed; 2 the corpus or the recipe
+cannot be used, or --strict met a bad line.")]
+pub struct Arguments {
+    /// Recorded sentences, one JSON object a line; plain or gzipped.
+    #[arg(long, value_name = "FILE")]
+    corpus: PathBuf,
+    /// What is measured.
+    #[arg(long, value_enum)]
+    protocol: Protocol,
+    /// The recipe that minds are trained with: default, paper, or a file.
+    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    recipe: String,
+    /// Draws rows, scenes and the training seed; without it, seeds 1, 2 and 3 run.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Rows of each seed, or episodes for one-shot and goals; all rows, or 24 episodes, without it.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=LIMIT_MAX))]
+    limit: Option<u64>,
+    /// Whose sentences: a fixed two thirds to choose settings on, the held-out rest, or all.
+    #[arg(long, value_name = "choosing|held-out|all", default_value = "all")]
+    people: People,
+    /// Also show so many failures of each kind (not with --json).
+    #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
+    failures: usize,
+    /// Stop at the first bad line of the corpus.
+    #[arg(long)]
+    strict: bool,
+    /// Threads at work.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=64))]
+    threads: u64,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Protocol {
+    /// Sentences for one primitive, before any lesson.
+    Primitives,
+    /// One sentence for washing, heating or cooling is taught.
+    OneShot,
+    /// One sentence for a whole task is taught.
+    Goals,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let recipe = recipe::load(&arguments.recipe)?;
+    let recipe = Recipe::parse(&recipe).map_err(Failure::bad_input)?;
+    let mut corpus = Corpus::read(&arguments.corpus).map_err(Failure::bad_input)?;
+    tell_bad_lines(&corpus.bad, arguments.strict)?;
+    let bad_lines = corpus.bad.len();
+    let people = arguments.people;
+    corpus.steps.retain(|row| people.include(&row.user));
+    corpus.goals.retain(|row| people.include(&row.user));
+    check_rows(&arguments, &corpus)?;
+
+    let one = arguments.seed.map(|seed| [seed]);
+    let seeds = one.as_ref().map_or(&SEEDS[..], |one| &one[..]);
+    let bar = Bar::new();
+    let setting = Setting {
+        recipe: &recipe,
+        seeds,
+        limit: arguments.limit.map(|limit| limit as usize),
+        people,
+        threads: arguments.threads as usize,
+        progress: &bar,
+        failures: arguments.failures,
+    };
+    let report = match arguments.protocol {
+        Protocol::Primitives => primitives(&setting, &corpus.steps)
+            .map(|report| printed(&report, &arguments, bad_lines)),
+        Protocol::OneShot => {
+            one_shot(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
+        }
+        Protocol::Goals => {
+            goals(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
+        }
+    };
+    bar.0.finish_and_clear();
+    let report =
+        report.map_err(|error| Failure::failed(format!("recipe {}: {error}", arguments.recipe)))?;
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(report.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {
+        Failure::failed(format!("the report cannot be written to standard output: {error}"))
+    })
+}
+
+/// A report with what reading the corpus found.
+#[derive(Serialize)]
+struct WithCorpus<'a, R> {
+    #[serde(flatten)]
+    report: &'a R,
+    bad_lines: usize,
+}
+
+fn printed<R: Serialize + std::fmt::Display>(
+    report: &R,
+    arguments: &Arguments,
+    bad_lines: usize,
+) -> String {
+    if !arguments.json {
+        return match bad_lines {
+            0 => report.to_string(),
+            count => format!("{report}\n{count} bad lines in the corpus\n"),
+        };
+    }
+    let object = serde_json::to_string_pretty(&WithCorpus { report, bad_lines });
+    object.expect("reports have text keys and finite numbers") + "\n"
+}
+
+fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
+    if let Some(BadLine { line, reason }) = bad.first().filter(|_| strict) {
+        return Err(Failure::bad_input(format!("line {line} of the corpus is bad: {reason}")));
+    }
+    for BadLine { line, reason } in bad.iter().take(BAD_LINES_SHOWN) {
+        eprintln!("apprentice: line {line} of the corpus is left out: {reason}");
+    }
+    if bad.len() > BAD_LINES_SHOWN {
+        let more = bad.len() - BAD_LINES_SHOWN;
+        eprintln!("apprentice: and {more} more bad lines; --strict stops at the first");
+    }
+    Ok(())
+}
+
+/// - errors: a corpus that has nothing for the protocol.
+fn check_rows(arguments: &Arguments, corpus: &Corpus) -> Result<(), Failure> {
+    let (needed, found, other) = match arguments.protocol {
+        Protocol::Primitives | Protocol::OneShot => {
+            ("sentences for single steps (u)", corpus.steps.len(), corpus.goals.len())
+        }
+        Protocol::Goals => {
+            ("sentences for whole tasks (goal)", corpus.goals.len(), corpus.steps.len())
+        }
+    };
+    if found > 0 {
+        return Ok(());
+    }
+    Err(Failure::bad_input(format!(
+        "the corpus {} has no {needed} of the people {}; of the other kind it has {other}",
+        arguments.corpus.display(),
+        arguments.people
+    )))
+}
+
+/// The progress of an evaluation, on standard error where that is a terminal.
+struct Bar(ProgressBar);
+
+impl Bar {
+    fn new() -> Bar {
+        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(5));
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {eta} left");
+        bar.set_style(style.expect("the template is well-formed"));
+        Bar(bar)
+    }
+}
+
+impl Progress for Bar {
+    fn expect(&self, count: usize) {
+        self.0.inc_length(count as u64);
+    }
+
+    fn advance(&self) {
+        self.0.inc(1);
+    }
+}

@@ -1,0 +1,23 @@
+//! Measuring the system on recorded human sentences: how much of what people really type it
+//! understands, before and after a lesson. `docs/evaluation.md` defines every figure.
+//!
+//! A parser is given what a person's sentence and the scene would give it; everything else a
+//! corpus knows is for judging the answer.
+
+pub mod corpus;
+mod draw;
+mod episode;
+pub mod failures;
+pub mod figures;
+pub mod goals;
+pub mod lessons;
+pub mod one_shot;
+pub mod parallel;
+pub mod people;
+pub mod primitives;
+mod renaming;
+pub mod report;
+pub mod scenes;
+pub mod score;
+mod seeds;
+mod table;

@@ -1,0 +1,199 @@
+//! The protocol *primitives*: does it understand how people ask for one primitive, and does it
+//! keep its hands off what nobody taught it?
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::corpus::Row;
+use super::draw;
+use super::failures::{Explain, Failure};
+use super::figures::{Reasons, Shares, share};
+use super::parallel::in_order;
+use super::report::{Base, Setting};
+use super::scenes::{Clashes, Stages};
+use super::score::{self, Verdict};
+use crate::grounding::Moment;
+use crate::language::Answer;
+use crate::learning::{Mind, TrainError, train};
+use crate::world::household::{Household, Scene, Task};
+
+/// The actions that stand for one primitive.
+pub const PRIMITIVES: [&str; 4] = ["PickupObject", "PutObject", "ToggleObject", "GotoLocation"];
+/// The actions that nobody has taught yet.
+pub const UNTAUGHT: [&str; 3] = ["CleanObject", "HeatObject", "CoolObject"];
+
+/// What the protocol found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PrimitivesReport {
+    #[serde(flatten)]
+    pub base: Base,
+    /// Over the primitives of all seeds together.
+    #[serde(flatten)]
+    pub shares: Shares,
+    pub untaught_n: usize,
+    /// Untaught sentences that were taken for something, carried out or not.
+    pub untaught_accepted: f64,
+    /// Of all untaught ones, those that came to what was meant, said in primitives.
+    pub untaught_right: f64,
+    pub by_action: BTreeMap<String, Shares>,
+    /// The same sentences with other things of the same name in the scene.
+    pub clashes: Shares,
+    /// Per seed, the shares of that seed alone.
+    pub by_seed: Vec<Shares>,
+    /// What the training of the last seed measured about itself.
+    pub training: BTreeMap<String, f64>,
+    /// Why not right, by verdict.
+    pub reasons: Reasons,
+    #[serde(skip)]
+    pub failures: Vec<Failure>,
+}
+
+/// Whether a row belongs to the primitives of this protocol.
+pub fn is_primitive(row: &Row) -> bool {
+    PRIMITIVES.contains(&row.label.as_str())
+        && !(row.label == "GotoLocation" && row.egocentric)
+        && score::core(&row.program).is_some()
+}
+
+pub fn is_untaught(row: &Row) -> bool {
+    UNTAUGHT.contains(&row.label.as_str())
+}
+
+/// Runs the protocol.
+///
+/// - errors: a training that fails.
+pub fn primitives(setting: &Setting<'_>, rows: &[Row]) -> Result<PrimitivesReport, TrainError> {
+    let household = Household::new();
+    let stages = Stages::new(&household);
+    let all: Vec<&Row> = rows.iter().filter(|row| is_primitive(row)).collect();
+    let untaught: Vec<&Row> = rows.iter().filter(|row| is_untaught(row)).collect();
+
+    let mut base = Base::new("primitives", setting);
+    let mut judged: Vec<Judged> = Vec::new();
+    let mut by_seed = Vec::new();
+    let mut training = BTreeMap::new();
+    for &seed in setting.seeds {
+        let recipe = setting.recipe.reseeded(seed);
+        let mind = train(&household, &recipe, &[])?;
+        training = mind.report().figures.clone();
+        let count = setting.limit.unwrap_or(all.len());
+        let mut drawn = draw::some(&mut draw::rng(seed, &["primitives"]), &all, count);
+        // The untaught are drawn in the proportion in which they stand in the corpus.
+        let part = (untaught.len() * drawn.len()).div_ceil(all.len().max(1));
+        drawn.extend(draw::some(&mut draw::rng(seed, &["untaught"]), &untaught, part));
+        let explain = Explain::new(&household, &recipe);
+        let judge = |row: &&Row| judge(&household, &stages, &mind, &explain, row, seed);
+        let of_seed = in_order(setting.threads, setting.progress, &drawn, judge);
+        let mut plain = Vec::new();
+        for result in of_seed {
+            match result {
+                Ok(one) => {
+                    if !one.untaught {
+                        plain.push((one.verdict, one.distance));
+                    }
+                    judged.push(one);
+                }
+                Err(reason) => base.unstaged.add(reason),
+            }
+        }
+        by_seed.push(Shares::of(&plain));
+    }
+    Ok(summarise(base, judged, by_seed, training, setting.failures))
+}
+
+/// One sentence, judged.
+struct Judged {
+    label: String,
+    untaught: bool,
+    verdict: Verdict,
+    distance: f32,
+    /// With things of the same name about; none for the untaught, and where no such scene exists.
+    clashing: Option<(Verdict, f32)>,
+    failure: Option<Failure>,
+}
+
+/// - errors: why there is no scene in which what was meant can be done.
+fn judge(
+    household: &Household,
+    stages: &Stages<'_>,
+    mind: &Mind,
+    explain: &Explain<'_>,
+    row: &Row,
+    seed: u64,
+) -> Result<Judged, String> {
+    let set = |clashes, purpose| {
+        let mut rng = draw::rng(seed, &[purpose, &row.id]);
+        stages.set(row, clashes, &mut rng)
+    };
+    let scene = set(Clashes::Avoided, "scene")?;
+    let answer = answer(household, mind, &scene, row);
+    let untaught = is_untaught(row);
+    let verdict = match untaught {
+        true => score::judge_taught(household, &scene, &row.program, &answer.outcome),
+        false => score::judge_primitive(&row.program, &answer.outcome),
+    };
+    let clashing = match set(Clashes::Allowed, "clashing scene") {
+        Ok(scene) if !untaught => {
+            let answer = self::answer(household, mind, &scene, row);
+            let verdict = score::judge_primitive(&row.program, &answer.outcome);
+            Some((verdict, score::distance(&answer.evidence)))
+        }
+        _ => None,
+    };
+    let failed = if untaught { verdict != Verdict::NotSure } else { verdict != Verdict::Right };
+    let failure = failed.then(|| match untaught {
+        true => explain.untaught(row, verdict, &answer),
+        false => explain.primitive(row, &scene, verdict, &answer),
+    });
+    let distance = score::distance(&answer.evidence);
+    Ok(Judged { label: row.label.clone(), untaught, verdict, distance, clashing, failure })
+}
+
+/// The answer to a row's sentence, said in a scene at the start of an episode.
+pub(super) fn answer(household: &Household, mind: &Mind, scene: &Scene, row: &Row) -> Answer {
+    let task = Task::free();
+    let moment = Moment { domain: household, scene, task: &task, mentioned: None };
+    mind.interpret(moment, &row.sentence)
+}
+
+fn summarise(
+    base: Base,
+    judged: Vec<Judged>,
+    by_seed: Vec<Shares>,
+    training: BTreeMap<String, f64>,
+    failures: usize,
+) -> PrimitivesReport {
+    let (untaught, primitives): (Vec<&Judged>, Vec<&Judged>) =
+        judged.iter().partition(|one| one.untaught);
+    let scored = |rows: &[&Judged]| -> Vec<(Verdict, f32)> {
+        rows.iter().map(|one| (one.verdict, one.distance)).collect()
+    };
+    let mut by_action = BTreeMap::new();
+    for label in PRIMITIVES.iter().chain(&UNTAUGHT) {
+        let rows: Vec<&Judged> = judged.iter().filter(|one| one.label == **label).collect();
+        by_action.insert((*label).to_owned(), Shares::of(&scored(&rows)));
+    }
+    let of = |verdicts: &[Verdict]| {
+        untaught.iter().filter(|one| verdicts.contains(&one.verdict)).count()
+    };
+    let accepted = of(&[Verdict::Right, Verdict::Wrong, Verdict::Impossible]);
+    let clashing: Vec<(Verdict, f32)> = primitives.iter().filter_map(|one| one.clashing).collect();
+    let mut reasons = Reasons::default();
+    for failure in judged.iter().filter_map(|one| one.failure.as_ref()) {
+        reasons.add(failure.verdict, &failure.reason);
+    }
+    PrimitivesReport {
+        base,
+        shares: Shares::of(&scored(&primitives)),
+        untaught_n: untaught.len(),
+        untaught_accepted: share(accepted, untaught.len()),
+        untaught_right: share(of(&[Verdict::Right]), untaught.len()),
+        by_action,
+        clashes: Shares::of(&clashing),
+        by_seed,
+        training,
+        reasons,
+        failures: Failure::choose(judged.into_iter().filter_map(|one| one.failure), failures),
+    }
+}
