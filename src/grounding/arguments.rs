@@ -148,8 +148,6 @@ impl<D: Domain> Arguments<'_, D> {
             };
             let mut kinds = self.fitting(operator, 1, kinds);
             kinds.retain(|kind| *kind != held);
-            // Of two things that share the name, the one that the robot went to.
-            kinds.sort_by_key(|kind| self.here.as_ref() != Some(kind));
             if !kinds.is_empty() {
                 let programs = kinds.iter().map(put).collect();
                 return Some(Filling { programs, penalty: penalty + 0.5 * skipped as f32 });
@@ -204,7 +202,12 @@ impl<D: Domain> Arguments<'_, D> {
                     Some((place, kinds.next()?.clone()))
                 })
             };
-            let (place, kind) = free(constants.is_empty()).or_else(|| free(true))?;
+            // What does not fit is said to be so by the world: "a Fridge cannot be picked up".
+            let unfit = || {
+                let mut left = (0..self.types.len()).filter(|place| !used.contains(place));
+                left.find_map(|place| Some((place, self.types[place].first()?.clone())))
+            };
+            let (place, kind) = free(constants.is_empty()).or_else(|| free(true)).or_else(unfit)?;
             used.insert(place);
             meant[number - 1] = Some(kind);
         }

@@ -183,6 +183,12 @@ impl<D: Domain> Ground<'_, D> {
         };
         let Some(filling) = filling else {
             let mut filled = program(Program { steps: Vec::new() });
+            let steps = &partial.candidate.program.steps;
+            let known = |kind: &Symbol| steps.iter().any(|step| step.args.contains(kind));
+            if offer.program.steps.is_empty() && arguments.types.iter().flatten().any(known) {
+                let reason = "it is about something that was already used".to_owned();
+                filled.missing = Some(Missing::Slot { reason });
+            }
             if !offer.program.steps.is_empty() {
                 let reason = format!("the words do not say what {} is for", offer.program);
                 filled.missing = Some(Missing::Slot { reason });
@@ -332,18 +338,24 @@ impl<D: Domain> Ground<'_, D> {
 /// The distance of a reading whose arguments are not the obvious ones: each point of penalty takes
 /// half a logit from its probability.
 fn further(distance: f32, penalty: f32) -> f32 {
-    let factor = libm::expf(-0.5 * penalty);
+    let factor = crate::numerics::exp(-0.5 * penalty);
     let kept = (1.0 - distance) * factor;
     distance / (distance + kept).max(f32::MIN_POSITIVE)
 }
 
-/// Whether something is put down and then taken, or gone to, again.
+/// Whether something is taken twice, or put down and then taken, or gone to, again.
 fn undoes_itself(roles: &Roles, program: &Program) -> bool {
+    let mut moved: Vec<&Symbol> = Vec::new();
     let mut placed: Vec<&Symbol> = Vec::new();
     for step in &program.steps {
         let Some(thing) = step.args.first() else { continue };
-        if (roles.takes(&step.operator) || roles.goes(&step.operator)) && placed.contains(&thing) {
+        let takes = roles.takes(&step.operator);
+        let again = takes && moved.contains(&thing);
+        if again || (roles.goes(&step.operator) && placed.contains(&thing)) {
             return true;
+        }
+        if takes || roles.puts(&step.operator) {
+            moved.push(thing);
         }
         if roles.puts(&step.operator) {
             placed.push(thing);

@@ -32,8 +32,17 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     /// a reranker the nearest feasible candidate wins. Nothing is carried out here.
     pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
-        let offers = heard.deciding();
-        let candidates = self.ground(moment, &offers, heard.threshold());
+        let mut candidates = Vec::new();
+        for ways in heard.deciding() {
+            let found = self.ground(moment, &ways, heard.threshold());
+            let runs = !feasible(&found).is_empty();
+            if runs || candidates.is_empty() {
+                candidates = found;
+            }
+            if runs {
+                break;
+            }
+        }
         let feasible = feasible(&candidates);
         let exact = heard.exact();
         // A seed keeps its own program even when a lesson with the same words has another one.
@@ -92,7 +101,7 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         let whole = self.listen(abstracted.whole());
         let parts = match abstracted.clauses(self.abstraction.split, grammar) {
             // An exact match of the whole needs no second opinion from its parts.
-            Some(parts) if !whole.exact() || ways == Ways::All => parts,
+            Some(parts) if !whole.literal() || ways == Ways::All => parts,
             _ => Vec::new(),
         };
         let parts = parts.into_iter().map(|part| self.listen(part)).collect();
@@ -156,6 +165,12 @@ impl ParsedClause {
         self.readings.iter().any(|(_, parse)| parse.exact > 0)
     }
 
+    /// Whether the words are exactly those of an exemplar, not only near enough to decide.
+    fn literal(&self) -> bool {
+        let literal = |parse: &Parse| parse.candidates[..parse.exact].iter().any(|c| !c.open);
+        self.readings.iter().any(|(_, parse)| literal(parse))
+    }
+
     /// What the parser offers, nearest first.
     fn offers(&self, seeds: u32) -> Vec<Offer<'_>> {
         let mut offers = Vec::new();
@@ -209,14 +224,22 @@ impl Heard {
         !self.parts.is_empty() && self.parts.iter().all(ParsedClause::exact)
     }
 
-    /// The ways of reading the utterance that may decide what it means.
-    fn deciding(&self) -> Vec<Vec<Vec<Offer<'_>>>> {
+    /// The ways of reading the utterance that may decide what it means, in turns: a later turn
+    /// counts only when nothing of the earlier ones runs.
+    fn deciding(&self) -> Vec<Vec<Vec<Vec<Offer<'_>>>>> {
         let whole = vec![self.whole.deciding(self.seeds)];
-        if self.whole.exact() {
-            return vec![whole];
+        if self.whole.literal() {
+            return vec![vec![whole]];
         }
         let parts: Vec<_> = self.parts.iter().map(|part| part.deciding(self.seeds)).collect();
-        if self.parts_exact() { vec![parts] } else { vec![whole, parts] }
+        let literal = !self.parts.is_empty() && self.parts.iter().all(ParsedClause::literal);
+        match (self.whole.exact(), literal) {
+            // "Pick up the mug and wash it" is what it says, however near it is to "wash it".
+            (true, true) => vec![vec![parts], vec![whole]],
+            (true, false) => vec![vec![whole], vec![parts]],
+            (false, _) if self.parts_exact() => vec![vec![parts]],
+            (false, _) => vec![vec![whole, parts]],
+        }
     }
 
     fn threshold(&self) -> f32 {
@@ -248,7 +271,11 @@ impl Heard {
             (true, Some(_)) => self.parts.iter().collect(),
             (true, None) => self.parts.iter().filter(silent).collect(),
         };
-        let explained = if explained.is_empty() { vec![&self.whole] } else { explained };
+        let explained = match (explained.is_empty(), self.parts.is_empty()) {
+            (false, _) => explained,
+            (true, false) if self.whole.nearest().next().is_none() => self.parts.iter().collect(),
+            (true, _) => vec![&self.whole],
+        };
         let lifted = match told {
             Some(candidate) => candidate.lifted.clone(),
             None if in_parts => self.parts.iter().map(|part| part.lifted().clone()).collect(),

@@ -317,7 +317,7 @@ mod tests {
         };
         check("spelling = false", "speling = false", "expected one of `adjectives`");
         check("spelling = false", "spelling = 3", "expected a boolean");
-        check("split = \"and\"", "split = \"often\"", "expected `and` or `clauses`");
+        check("split = \"and\"", "split = \"often\"", "expected one of `and`, `clauses`, `verbs`");
         check("name = \"tiny\"", "name = \"ti ny\"", "expected 1 to 64 letters");
         check("table = \"paper\"", "table = \"none\"", "there is no word table \"none\"");
         check("kind = \"exemplar\"", "kind = \"oracle\"", "expected `exemplar`");

@@ -233,7 +233,7 @@ impl FeaturesParser {
             number: top.nearest,
             open: true,
         };
-        if nothing_named && self.roles.goes(operator) && self.moves(clause) {
+        if nothing_named && self.moves(clause, self.roles.goes(operator)) {
             return vec![idle(0.0)];
         }
         let mut offers: Vec<Scored> = judged
@@ -249,7 +249,10 @@ impl FeaturesParser {
             .collect();
         // A landmark on the way that is not here, and "close the door" where nothing is open, hold
         // up nothing else that was said.
-        if self.roles.goes(operator) || (nothing_named && self.roles.is_door(operator)) {
+        let landmark = clause.mentions.iter().any(|mention| !mention.pronoun);
+        if (landmark && self.roles.goes(operator))
+            || (nothing_named && self.roles.is_door(operator))
+        {
             let distance = 1.0 - sigmoid(top.logit);
             offers.extend(Some(idle(distance)).filter(|_| distance <= self.threshold()));
         }
@@ -257,14 +260,18 @@ impl FeaturesParser {
     }
 
     /// "Turn around": nothing that a primitive could do.
-    fn moves(&self, clause: &Clause) -> bool {
+    ///
+    /// - `goes`: whether it is likeliest to mean going somewhere.
+    fn moves(&self, clause: &Clause, goes: bool) -> bool {
         let verb = self.knowledge.grammar().main_verb(&clause.lifted.words);
         verb.is_some_and(|verb| {
             let habits = &self.knowledge.habits;
             let column = habits.order.iter().position(|name| self.roles.goes(name));
             let row = habits.counts(&format!("V:{}", verb.word));
             let often = row.zip(column).is_some_and(|(row, column)| row[column] >= MOVES_MIN);
-            often || self.knowledge.lists.moving.contains(&verb.word)
+            let listed = self.knowledge.lists.moving.contains(&verb.word);
+            // "Turn on" is about something, though it may not be named.
+            if goes { often || listed } else { listed && verb.particle.is_empty() }
         })
     }
 
