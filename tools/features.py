@@ -5,7 +5,7 @@ Run by hand; the output is committed. Needs numpy. Reads ../shared/data (see the
 household's names, words and seeds in data/household, and data/words/default.words. Writes
 
     data/household/habits.toml   how often each word stood in a clause that meant each primitive
-    data/recipes/features.toml   the weights of the two judges and the lists of words they use
+    data/recipes/default.toml    from its mark on: the weights of the two judges, the lists of words
 
 No sentence of the recordings is written: counts of single words, and weights.
 
@@ -1084,6 +1084,11 @@ def report(model, recordings, choose, seed, limit, episodes):
 
 
 # ---------------------------------------------------------------- writing
+# Gained nothing (docs/features.md): the product has them not, so what is written is learned without.
+LEFT_OUT = ("primitive", "steps_shared", "undone")
+MARK = "# From here on written by tools/features.py: change the tool, not what follows."
+
+
 def numbers(values):
     return "[" + ", ".join(f"{value:g}" for value in values) + "]"
 
@@ -1095,13 +1100,12 @@ def write(model):
              "", "order = " + json.dumps(PRIMITIVES), "clauses = " + numbers([habits.clauses[p] for p in PRIMITIVES]), "", "[words]"]
     lines += [f"{json.dumps(word)} = {numbers(row)}" for word, row in sorted(habits.counts.items())]
     (ROOT / "data/household/habits.toml").write_text("\n".join(lines) + "\n")
-    lines = ["# What the `features` parser weighs. Written by tools/features.py; change the tool, not this file.", "",
-             "# The threshold is calibrated at each training, but never below this.", f"floor = {FLOOR}", "", "[primitive]"]
+    lines = ["[parser.features.primitive]"]
     lines += [f"{name} = {weight:.4f}" for name, weight in zip(PRIMITIVE_FEATURES, model.judge.weights)]
     for kind, weights in model.lessons.weights.items():
-        lines += ["", f"[lesson.{kind}]"]
-        lines += [f"{name} = {weight:.4f}" for name, weight in zip(LESSON_FEATURES, weights)]
-    lines += ["", "[lists]"]
+        lines += ["", f"[parser.features.lesson.{kind}]"]
+        lines += [f"{name} = {weight:.4f}" for name, weight in zip(LESSON_FEATURES, weights) if name not in LEFT_OUT]
+    lines += ["", "[abstraction.lists]"]
     for name, words in LISTS.items():
         text, row = [], "   "
         for word in words:
@@ -1110,7 +1114,9 @@ def write(model):
                 row = "   "
             row += f' "{word}",'
         lines += [f"{name} = [", *text, row, "]"]
-    (ROOT / "data/recipes/features.toml").write_text("\n".join(lines) + "\n")
+    recipe = ROOT / "data/recipes/default.toml"
+    kept, mark, _ = recipe.read_text().partition(MARK)
+    recipe.write_text(kept + mark + "\n\n" + "\n".join(lines) + "\n")
     print(f"wrote {len(habits.counts)} habits and {len(PRIMITIVE_FEATURES)} + 2 x {len(LESSON_FEATURES)} weights")
 
 
@@ -1134,6 +1140,8 @@ def main():
             print({n: [round(float(w[i]), 2) for w in model.lessons.weights.values()] for i, n in enumerate(LESSON_FEATURES)})
             report(model, recordings, lambda row: not held_out(row) and fold(row) == number, args.seed, args.limit, args.episodes)
         return
+    if not args.measure:
+        off += LEFT_OUT
     model = Model(recordings, lambda row: not held_out(row), args.seed, off, args.never)
     if args.measure == "final":
         report(model, recordings, held_out, args.seed, args.limit, args.episodes)
