@@ -1,11 +1,13 @@
 use super::names::Names;
 use super::settings::{Abstraction, Split};
-use crate::language::{Clause, LiftedUtterance, Mention, Utterance, Word};
+use crate::language::{Clause, Grammar, Mention, Utterance, Word, WordLists};
 use crate::limits::{CLAUSES_MAX, MENTIONS_MAX};
 use crate::world::Lexicon;
 
 /// Words that may stand between "from" and a name.
 const DETERMINERS: [&str; 9] = ["the", "a", "an", "its", "his", "her", "their", "your", "my"];
+/// A name is a fixture's when so many tenths of its uses are.
+const FIXTURE_TENTHS: u32 = 3;
 /// Words that open a phrase which says where a thing is.
 const LOCATION: &str = "from";
 
@@ -65,6 +67,12 @@ impl<'a> Abstractor<'a> {
                 continue;
             }
             let ahead = &tokens[at..];
+            if self.settings.lists.as_ref().is_some_and(|lists| self.is_verb(lists, &pieces, ahead))
+            {
+                pieces.push(Piece::Word(token.to_owned()));
+                at += 1;
+                continue;
+            }
             let end = ahead.iter().position(|token| is_mark(token)).unwrap_or(ahead.len());
             match self.mention(&ahead[..end]) {
                 Some((count, mention)) if mentions < MENTIONS_MAX => {
@@ -72,6 +80,7 @@ impl<'a> Abstractor<'a> {
                     let said = ahead[..count].iter().map(|word| (*word).to_owned()).collect();
                     mentions -= self.push_named(&mut pieces, mention, said);
                     at += count;
+                    at += self.portions(&tokens[at..]);
                 }
                 _ => {
                     pieces.push(Piece::Word(token.to_owned()));
@@ -80,6 +89,35 @@ impl<'a> Abstractor<'a> {
             }
         }
         Abstracted { pieces }
+    }
+
+    /// Whether a name is said as a verb: where a clause begins, before an object.
+    fn is_verb(&self, lists: &WordLists, pieces: &[Piece], ahead: &[&str]) -> bool {
+        let [word, after, ..] = ahead else { return false };
+        if !lists.noun_verbs.contains(*word) && !lists.verbs.contains(*word) {
+            return false;
+        }
+        // The longer name wins: "plate rack" is no plating.
+        if self.names.starting(ahead).is_none_or(|(count, _)| count > 1) {
+            return false;
+        }
+        let determined = lists.determiners.contains(*after)
+            || self.lexicon.pronouns.iter().any(|pronoun| pronoun == after);
+        match pieces.last() {
+            None | Some(Piece::Mark) => determined || self.names.starting(&ahead[1..]).is_some(),
+            Some(Piece::Word(before)) => match before.as_str() {
+                "and" | "then" | "or" => determined || self.names.starting(&ahead[1..]).is_some(),
+                "to" => determined,
+                _ => false,
+            },
+            Some(Piece::Named { .. }) => false,
+        }
+    }
+
+    /// How many words behind a name only say that it is a part: "apple slices".
+    fn portions(&self, behind: &[&str]) -> usize {
+        let Some(lists) = &self.settings.lists else { return 0 };
+        behind.iter().take_while(|word| lists.is_portion(word)).count()
     }
 
     fn mention(&self, words: &[&str]) -> Option<(usize, Mention)> {
@@ -122,9 +160,30 @@ impl<'a> Abstractor<'a> {
                 _ => break,
             }
         }
+        if let Some(part) = self.part_of(pieces).filter(|_| !mention.pronoun) {
+            let words = pieces.split_off(part).into_iter().filter_map(|piece| match piece {
+                Piece::Word(word) => Some(word),
+                _ => None,
+            });
+            said.splice(0..0, words);
+        }
         let fixture = self.fixture(&mention);
         pieces.push(Piece::Named { mention, attributes, fixture, said });
         folded
+    }
+
+    /// Where "slice of the" begins, if the pieces end with such words.
+    fn part_of(&self, pieces: &[Piece]) -> Option<usize> {
+        let lists = self.settings.lists.as_ref()?;
+        let word = |at: usize| match pieces.get(at) {
+            Some(Piece::Word(word)) => word.as_str(),
+            _ => "",
+        };
+        let determined =
+            (0..pieces.len()).rev().take_while(|&at| lists.determiners.contains(word(at))).count();
+        let of = (pieces.len() - determined).checked_sub(1)?;
+        let part = of.checked_sub(1)?;
+        (word(of) == "of" && lists.is_portion(word(part))).then_some(part)
     }
 
     fn fixture(&self, mention: &Mention) -> Option<String> {
@@ -132,8 +191,20 @@ impl<'a> Abstractor<'a> {
             return None;
         }
         let word = |kind| self.lexicon.fixtures.get(kind);
+        if self.settings.lists.is_some() {
+            return self.usual_fixture(mention);
+        }
         let all_fixtures = mention.types.iter().all(|kind| word(kind).is_some());
         mention.types.first().filter(|_| all_fixtures).and_then(word).cloned()
+    }
+
+    /// The word of the fixture that a fair share of a name's uses mean: "sink" is the sink, though
+    /// some say it of other things.
+    fn usual_fixture(&self, mention: &Mention) -> Option<String> {
+        let meanings = self.lexicon.names.get(&mention.surface)?;
+        let all: u32 = meanings.iter().map(|meaning| meaning.count).sum();
+        let usual = meanings.iter().filter(|m| m.count * 10 >= all * FIXTURE_TENTHS);
+        usual.filter_map(|meaning| self.lexicon.fixtures.get(&meaning.kind)).min().cloned()
     }
 }
 
@@ -145,7 +216,16 @@ impl Abstracted {
 
     /// The clauses between the places where `split` cuts; `None` when there is nothing to cut or
     /// when there would be more than [`CLAUSES_MAX`].
-    pub fn clauses(&self, split: Split) -> Option<Vec<Clause>> {
+    ///
+    /// With [`Split::Verbs`] a single clause is returned as well when it is not all that was said:
+    /// "holding the card, turn on the lamp".
+    pub fn clauses(&self, split: Split, grammar: Option<Grammar<'_>>) -> Option<Vec<Clause>> {
+        if let (Split::Verbs, Some(grammar)) = (split, grammar) {
+            let whole = self.whole();
+            let clauses = grammar.cut(&whole);
+            let shorter = clauses.first()?.lifted.words.len() < whole.lifted.words.len();
+            return (shorter && clauses.len() <= CLAUSES_MAX).then_some(clauses);
+        }
         let parts = self.pieces.split(|piece| cuts(piece, split));
         let clauses: Vec<Clause> = parts
             .filter(|part| part.iter().any(|piece| !matches!(piece, Piece::Mark)))
@@ -188,10 +268,10 @@ pub fn without_locations(whole: &Clause) -> Option<Clause> {
 }
 
 fn clause<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Clause {
-    let mut out = Clause { lifted: LiftedUtterance::default(), ..Clause::default() };
+    let mut out = Clause::default();
     for piece in pieces {
         match piece {
-            Piece::Mark => {}
+            Piece::Mark => out.marks.push(out.lifted.words.len()),
             Piece::Word(word) => {
                 out.lifted.words.push(Word::Text(word.clone()));
                 out.words.push(word.clone());
@@ -214,8 +294,8 @@ fn is_mark(token: &str) -> bool {
 
 fn cuts(piece: &Piece, split: Split) -> bool {
     match piece {
-        Piece::Word(word) => word == "and" || (split == Split::Clauses && word == "then"),
-        Piece::Mark => split == Split::Clauses,
+        Piece::Word(word) => word == "and" || (split != Split::And && word == "then"),
+        Piece::Mark => split != Split::And,
         Piece::Named { .. } => false,
     }
 }

@@ -71,6 +71,7 @@ impl Bench {
             pronouns: vec!["it".to_owned(), "them".to_owned()],
             adjectives: ["red", "small", "wooden"].map(str::to_owned).to_vec(),
             fixtures: BTreeMap::from([(Symbol::new("Lamp"), "lamp".to_owned())]),
+            ..Lexicon::default()
         };
         let seeds = [
             ("take the <thing>", "TAKE <thing:1>"),
@@ -273,7 +274,7 @@ impl SemanticParser for Overlap {
         for near in nearest.iter().filter(|near| near.distance <= self.threshold) {
             if candidates.iter().all(|known| known.program != near.program) {
                 let Near { program, distance, number, .. } = near.clone();
-                candidates.push(Scored { program, distance, number });
+                candidates.push(Scored { program, distance, number, open: false });
                 exact += usize::from(near.distance == 0.0);
             }
         }

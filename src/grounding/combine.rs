@@ -1,8 +1,10 @@
+use super::arguments::Arguments;
 use super::moment::Moment;
 use super::resolver::resolve;
 use super::settings::Execution;
 use crate::language::{
-    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol,
+    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Roles, Step, Symbol,
+    WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
 use crate::world::Domain;
@@ -18,15 +20,28 @@ pub struct Offer<'a> {
     pub exact: bool,
     /// Whether the exemplar is a seed.
     pub seed: bool,
+    /// Whether the world says which mention fills which slot.
+    pub open: bool,
+}
+
+/// How clauses are put together.
+pub struct Context<'a> {
+    pub execution: &'a Execution,
+    /// For choosing the arguments of open programs.
+    pub lists: Option<&'a WordLists>,
+    /// The distance of a chain from that of its first clauses and the next one's.
+    pub chain: &'a dyn Fn(f32, f32) -> f32,
 }
 
 /// A ground program for the whole utterance, and what the world says to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     pub program: Program,
-    /// The largest of its clauses' distances: a chain is as sure as its weakest link.
+    /// That of the chain of its clauses.
     pub distance: f32,
     pub seed: bool,
+    /// Whether all of its words were exactly an exemplar's, clause by clause.
+    pub exact: bool,
     pub verdict: Verdict,
     pub lifted: Vec<LiftedUtterance>,
     /// What was named last, for a later "it".
@@ -52,15 +67,17 @@ pub enum Verdict {
 ///   fastest.
 pub fn combine<D: Domain>(
     moment: &Moment<'_, D>,
-    execution: &Execution,
+    context: &Context<'_>,
     clauses: &[Vec<Offer<'_>>],
 ) -> Vec<Candidate> {
     let start = Partial {
         scene: moment.scene.clone(),
+        literal: true,
         candidate: Candidate {
             program: Program { steps: Vec::new() },
             distance: 0.0,
             seed: true,
+            exact: true,
             verdict: Verdict::Runs { bindings: Vec::new() },
             lifted: Vec::new(),
             mentioned: moment.mentioned.cloned(),
@@ -68,7 +85,7 @@ pub fn combine<D: Domain>(
     };
     let mut done = Vec::new();
     if !clauses.is_empty() {
-        extend(&Ground { moment, execution }, clauses, &start, &mut done);
+        extend(&Ground { moment, context }, clauses, &start, &mut done);
     }
     done
 }
@@ -76,6 +93,8 @@ pub fn combine<D: Domain>(
 /// The first clauses of a combination, and the scene they lead to.
 struct Partial<S> {
     scene: S,
+    /// Whether every clause so far was read as one primitive.
+    literal: bool,
     candidate: Candidate,
 }
 
@@ -86,7 +105,19 @@ fn extend<D: Domain>(
     done: &mut Vec<Candidate>,
 ) {
     let Some((next, rest)) = clauses.split_first() else {
-        done.push(partial.candidate.clone());
+        let mut whole = partial.candidate.clone();
+        let roles = &ground.moment.domain.lexicon().roles;
+        // Clauses that ask for nothing ("turn around") are no request by themselves.
+        if whole.program.steps.is_empty() {
+            return;
+        }
+        if ground.context.lists.is_some() && partial.literal && undoes_itself(roles, &whole.program)
+        {
+            let reason = "it would be taken again from where it was put, so it was put there for \
+                          something that is not known";
+            whole.verdict = Verdict::Unfilled { reason: reason.to_owned() };
+        }
+        done.push(whole);
         return;
     };
     for offer in next {
@@ -99,7 +130,7 @@ fn extend<D: Domain>(
 
 struct Ground<'a, D: Domain> {
     moment: &'a Moment<'a, D>,
-    execution: &'a Execution,
+    context: &'a Context<'a>,
 }
 
 impl<D: Domain> Ground<'_, D> {
@@ -110,6 +141,19 @@ impl<D: Domain> Ground<'_, D> {
         let before = partial.candidate.mentioned.as_ref();
         let referents = resolve(domain, &partial.scene, &offer.clause.mentions, before);
         let held = domain.held(&partial.scene);
+        let mentioned = referents.last.clone();
+        if let (true, Some(lists)) = (offer.open, self.context.lists) {
+            let arguments = Arguments {
+                domain,
+                lists,
+                clause: offer.clause,
+                types: &referents.types,
+                held: held.clone(),
+                here: domain.here(&partial.scene),
+                last: before,
+            };
+            return self.advance_open(partial, offer, &arguments, mentioned);
+        }
         let mut first = None;
         for types in choices(&referents.types, &offer.program) {
             let filled = fill(&offer.program, &offer.clause.mentions, &types, held.as_ref());
@@ -122,6 +166,49 @@ impl<D: Domain> Ground<'_, D> {
             };
         }
         first.expect("there is always the choice of every mention's best type")
+    }
+
+    /// Grounds a clause whose arguments the world chooses.
+    fn advance_open(
+        &self,
+        partial: &Partial<D::Scene>,
+        offer: &Offer<'_>,
+        arguments: &Arguments<'_, D>,
+        mentioned: Option<Symbol>,
+    ) -> Partial<D::Scene> {
+        let program = |program| Filled { program, missing: None };
+        let filling = match offer.program.steps.is_empty() {
+            true => None,
+            false => arguments.fill(&offer.program),
+        };
+        let Some(filling) = filling else {
+            let mut filled = program(Program { steps: Vec::new() });
+            let steps = &partial.candidate.program.steps;
+            let known = |kind: &Symbol| steps.iter().any(|step| step.args.contains(kind));
+            if offer.program.steps.is_empty() && arguments.types.iter().flatten().any(known) {
+                let reason = "it is about something that was already used".to_owned();
+                filled.missing = Some(Missing::Slot { reason });
+            }
+            if !offer.program.steps.is_empty() {
+                let reason = format!("the words do not say what {} is for", offer.program);
+                filled.missing = Some(Missing::Slot { reason });
+            }
+            return self.try_filled(partial, offer, filled, mentioned);
+        };
+        let further = Offer { distance: further(offer.distance, filling.penalty), ..offer.clone() };
+        let mut first = None;
+        for ground in filling.programs.into_iter().take(TYPE_CHOICES_MAX) {
+            let named = ground.steps.last().and_then(|step| step.args.first()).cloned();
+            let mentioned = named.or_else(|| mentioned.clone());
+            let next = self.try_filled(partial, &further, program(ground), mentioned);
+            match next.candidate.verdict {
+                Verdict::Runs { .. } => return next,
+                Verdict::Forbidden { mendable: true, .. } if first.is_none() => return next,
+                _ => {}
+            }
+            first.get_or_insert(next);
+        }
+        first.expect("a filling has at least one program")
     }
 
     fn try_filled(
@@ -165,13 +252,15 @@ impl<D: Domain> Ground<'_, D> {
         lifted.push(offer.clause.lifted.clone());
         let candidate = Candidate {
             program: Program { steps },
-            distance: so_far.distance.max(offer.distance),
+            distance: (self.context.chain)(so_far.distance, offer.distance),
             seed: so_far.seed && offer.seed,
+            exact: so_far.exact && offer.exact,
             verdict,
             lifted,
             mentioned,
         };
-        Partial { scene, candidate }
+        let literal = partial.literal && offer.seed;
+        Partial { scene, literal, candidate }
     }
 
     /// Carries the steps out on the copy of the scene.
@@ -189,7 +278,7 @@ impl<D: Domain> Ground<'_, D> {
         let before = steps.len();
         let contradicted = |scene: &D::Scene, from: usize| {
             let rest = Program { steps: program.steps[from..].to_vec() };
-            if !self.execution.polarity {
+            if !self.context.execution.polarity {
                 return None;
             }
             let (step, reason) = domain.contradiction(scene, &offer.clause.words, &rest)?;
@@ -212,12 +301,18 @@ impl<D: Domain> Ground<'_, D> {
             let mut unasked = 0;
             let bound = loop {
                 let refusal = match domain.step(scene, task, step) {
-                    Ok(bound) => break bound,
+                    Ok(bound) => break Some(bound),
                     Err(refusal) => refusal,
                 };
                 // What is in the fridge across the room takes two: going there and opening it.
+                let roles = &domain.lexicon().roles;
+                let means = roles.goes(&step.operator) || roles.is_door(&step.operator);
+                // How the lesson got there need not be how one gets there here.
+                if offer.open && program.steps.len() > 1 && means && refusal.first.is_none() {
+                    break None;
+                }
                 let mendable = refusal.first.is_some();
-                let first = refusal.first.filter(|_| self.execution.approach);
+                let first = refusal.first.filter(|_| self.context.execution.approach);
                 let Some(first) = first.filter(|_| unasked < UNASKED_STEPS_MAX) else {
                     return Err(refused(refusal.reason, mendable));
                 };
@@ -231,11 +326,42 @@ impl<D: Domain> Ground<'_, D> {
                     return Err(contradiction);
                 }
             };
-            bindings.push(bound);
-            steps.push(step.clone());
+            if let Some(bound) = bound {
+                bindings.push(bound);
+                steps.push(step.clone());
+            }
         }
         Ok(())
     }
+}
+
+/// The distance of a reading whose arguments are not the obvious ones: each point of penalty takes
+/// half a logit from its probability.
+fn further(distance: f32, penalty: f32) -> f32 {
+    let factor = crate::numerics::exp(-0.5 * penalty);
+    let kept = (1.0 - distance) * factor;
+    distance / (distance + kept).max(f32::MIN_POSITIVE)
+}
+
+/// Whether something is taken twice, or put down and then taken, or gone to, again.
+fn undoes_itself(roles: &Roles, program: &Program) -> bool {
+    let mut moved: Vec<&Symbol> = Vec::new();
+    let mut placed: Vec<&Symbol> = Vec::new();
+    for step in &program.steps {
+        let Some(thing) = step.args.first() else { continue };
+        let takes = roles.takes(&step.operator);
+        let again = takes && moved.contains(&thing);
+        if again || (roles.goes(&step.operator) && placed.contains(&thing)) {
+            return true;
+        }
+        if takes || roles.puts(&step.operator) {
+            moved.push(thing);
+        }
+        if roles.puts(&step.operator) {
+            placed.push(thing);
+        }
+    }
+    false
 }
 
 /// Steps taken unasked before one step that needs them.

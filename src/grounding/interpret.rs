@@ -1,11 +1,11 @@
 use super::abstractor::{Abstractor, without_locations};
-use super::combine::{Candidate, Offer, Verdict, combine};
+use super::combine::{Candidate, Context, Offer, Verdict, combine};
 use super::moment::Moment;
 use super::reranker::Reranker;
 use super::resolver::resolve;
 use super::settings::{Abstraction, Execution};
 use crate::language::{
-    Answer, Clause, Discarded, Evidence, LiftedUtterance, Near, Outcome, Symbol, Utterance,
+    Answer, Clause, Discarded, Evidence, Grammar, LiftedUtterance, Near, Outcome, Symbol, Utterance,
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
 use crate::parser::{Parse, SemanticParser};
@@ -32,18 +32,28 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     /// a reranker the nearest feasible candidate wins. Nothing is carried out here.
     pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
-        let offers = heard.deciding();
-        let candidates = self.ground(moment, &offers);
+        let mut candidates = Vec::new();
+        for ways in heard.deciding() {
+            let found = self.ground(moment, &ways, heard.threshold());
+            let runs = !feasible(&found).is_empty();
+            if runs || candidates.is_empty() {
+                candidates = found;
+            }
+            if runs {
+                break;
+            }
+        }
         let feasible = feasible(&candidates);
         let exact = heard.exact();
         // A seed keeps its own program even when a lesson with the same words has another one.
         let seeded = feasible.iter().find(|candidate| exact && candidate.seed);
         let (chosen, reranked) = match (self.reranker, seeded) {
             (_, Some(seeded)) => (Some(*seeded), 0),
-            (Some(reranker), None) if feasible.len() > 1 => {
+            (Some(reranker), None) if self.rivals(&feasible) > 1 => {
                 let words = utterance.tokens();
-                let best = reranker.best(moment, &words, feasible.iter().map(|c| &c.program));
-                (Some(feasible[best]), feasible.len() as u32)
+                let rivals = &feasible[..self.rivals(&feasible)];
+                let best = reranker.best(moment, &words, rivals.iter().map(|c| &c.program));
+                (Some(rivals[best]), rivals.len() as u32)
             }
             _ => (feasible.first().copied(), 0),
         };
@@ -69,17 +79,29 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         utterance: &Utterance,
     ) -> Vec<Candidate> {
         let heard = self.hear(moment, utterance, Ways::All);
-        let all = self.ground(moment, &heard.all());
+        let all = self.ground(moment, &heard.all(), heard.threshold());
         feasible(&all).into_iter().cloned().collect()
+    }
+
+    /// How many of the feasible candidates, from the first, the reranker chooses from.
+    fn rivals(&self, feasible: &[&Candidate]) -> usize {
+        match feasible.first() {
+            Some(first) if self.parser.sure_of_order() => {
+                feasible.iter().take_while(|c| c.distance <= first.distance && c.exact).count()
+            }
+            _ => feasible.len(),
+        }
     }
 
     fn hear<D: Domain>(&self, moment: &Moment<'_, D>, said: &Utterance, ways: Ways) -> Heard {
         let lexicon = moment.domain.lexicon();
         let abstracted = Abstractor::new(lexicon, self.abstraction, self.known).read(said);
+        let grammar = self.abstraction.lists.as_ref();
+        let grammar = grammar.map(|lists| Grammar { lists, adjectives: &lexicon.adjectives });
         let whole = self.listen(abstracted.whole());
-        let parts = match abstracted.clauses(self.abstraction.split) {
+        let parts = match abstracted.clauses(self.abstraction.split, grammar) {
             // An exact match of the whole needs no second opinion from its parts.
-            Some(parts) if !whole.exact() || ways == Ways::All => parts,
+            Some(parts) if !whole.literal() || ways == Ways::All => parts,
             _ => Vec::new(),
         };
         let parts = parts.into_iter().map(|part| self.listen(part)).collect();
@@ -102,12 +124,18 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         &self,
         moment: &Moment<'_, D>,
         ways: &[Vec<Vec<Offer<'_>>>],
+        threshold: f32,
     ) -> Vec<Candidate> {
+        let lists = self.abstraction.lists.as_ref();
+        let chain = |so_far, next| self.parser.chain(so_far, next);
+        let context = Context { execution: self.execution, lists, chain: &chain };
         let mut all: Vec<Candidate> =
-            ways.iter().flat_map(|clauses| combine(moment, self.execution, clauses)).collect();
+            ways.iter().flat_map(|clauses| combine(moment, &context, clauses)).collect();
         // Stable: at equal distance the whole utterance comes before its parts, and within each
         // the older exemplar first.
         all.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        // A chain of clauses that are near enough one by one may not be.
+        all.retain(|candidate| candidate.distance <= threshold);
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in all {
             if kept.len() < CANDIDATES_MAX && kept.iter().all(|k| k.program != candidate.program) {
@@ -137,6 +165,12 @@ impl ParsedClause {
         self.readings.iter().any(|(_, parse)| parse.exact > 0)
     }
 
+    /// Whether the words are exactly those of an exemplar, not only near enough to decide.
+    fn literal(&self) -> bool {
+        let literal = |parse: &Parse| parse.candidates[..parse.exact].iter().any(|c| !c.open);
+        self.readings.iter().any(|(_, parse)| literal(parse))
+    }
+
     /// What the parser offers, nearest first.
     fn offers(&self, seeds: u32) -> Vec<Offer<'_>> {
         let mut offers = Vec::new();
@@ -146,6 +180,7 @@ impl ParsedClause {
                 program: scored.program.clone(),
                 distance: scored.distance,
                 exact: place < parse.exact,
+                open: scored.open,
                 seed: scored.number < seeds,
             }));
         }
@@ -189,14 +224,26 @@ impl Heard {
         !self.parts.is_empty() && self.parts.iter().all(ParsedClause::exact)
     }
 
-    /// The ways of reading the utterance that may decide what it means.
-    fn deciding(&self) -> Vec<Vec<Vec<Offer<'_>>>> {
+    /// The ways of reading the utterance that may decide what it means, in turns: a later turn
+    /// counts only when nothing of the earlier ones runs.
+    fn deciding(&self) -> Vec<Vec<Vec<Vec<Offer<'_>>>>> {
         let whole = vec![self.whole.deciding(self.seeds)];
-        if self.whole.exact() {
-            return vec![whole];
+        if self.whole.literal() {
+            return vec![vec![whole]];
         }
         let parts: Vec<_> = self.parts.iter().map(|part| part.deciding(self.seeds)).collect();
-        if self.parts_exact() { vec![parts] } else { vec![whole, parts] }
+        let literal = !self.parts.is_empty() && self.parts.iter().all(ParsedClause::literal);
+        match (self.whole.exact(), literal) {
+            // "Pick up the mug and wash it" is what it says, however near it is to "wash it".
+            (true, true) => vec![vec![parts], vec![whole]],
+            (true, false) => vec![vec![whole], vec![parts]],
+            (false, _) if self.parts_exact() => vec![vec![parts]],
+            (false, _) => vec![vec![whole, parts]],
+        }
+    }
+
+    fn threshold(&self) -> f32 {
+        self.whole.readings[0].1.threshold
     }
 
     /// Every way of reading the utterance.
@@ -224,7 +271,11 @@ impl Heard {
             (true, Some(_)) => self.parts.iter().collect(),
             (true, None) => self.parts.iter().filter(silent).collect(),
         };
-        let explained = if explained.is_empty() { vec![&self.whole] } else { explained };
+        let explained = match (explained.is_empty(), self.parts.is_empty()) {
+            (false, _) => explained,
+            (true, false) if self.whole.nearest().next().is_none() => self.parts.iter().collect(),
+            (true, _) => vec![&self.whole],
+        };
         let lifted = match told {
             Some(candidate) => candidate.lifted.clone(),
             None if in_parts => self.parts.iter().map(|part| part.lifted().clone()).collect(),
@@ -240,7 +291,7 @@ impl Heard {
                 nearest.push(near.clone());
             }
         }
-        let threshold = self.whole.readings[0].1.threshold;
+        let threshold = self.threshold();
         Evidence { lifted, nearest, threshold, ..Evidence::default() }
     }
 }

@@ -4,6 +4,7 @@
 //! rerank.
 
 mod abstractor;
+mod arguments;
 #[cfg(test)]
 pub(crate) mod bench;
 mod combine;

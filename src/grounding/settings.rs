@@ -1,5 +1,7 @@
 use serde::{Deserialize, Serialize};
 
+use crate::language::WordLists;
+
 /// How an utterance becomes lifted clauses. Everything is off in the recipe `paper`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -15,6 +17,10 @@ pub struct Abstraction {
     /// Read a word of five letters or more that is in no table as the name one slip away from it.
     pub spelling: bool,
     pub split: Split,
+    /// Words by what they do in a clause. With them a name that is a verb too ("microwave") is read
+    /// as a verb where an object follows, and "a slice of the apple" as the apple.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lists: Option<WordLists>,
 }
 
 /// Where an utterance may be cut into clauses.
@@ -26,6 +32,8 @@ pub enum Split {
     /// Also at "then", comma, full stop and semicolon: a quarter of the recorded compound
     /// sentences have no "and".
     Clauses,
+    /// At marks and joining words, but only where a verb follows; needs the lists.
+    Verbs,
 }
 
 /// How programs meet the scene. Everything is off in the recipe `paper`.

@@ -12,6 +12,7 @@ fn plain() -> (Abstraction, Execution) {
         fixtures: false,
         spelling: false,
         split: Split::And,
+        lists: None,
     };
     (abstraction, Execution { polarity: false, approach: false })
 }
@@ -25,6 +26,7 @@ fn rich() -> (Abstraction, Execution) {
         fixtures: true,
         spelling: true,
         split: Split::Clauses,
+        lists: None,
     };
     (abstraction, Execution { polarity: true, approach: true })
 }

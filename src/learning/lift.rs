@@ -1,6 +1,8 @@
 use super::{Lesson, Recipe};
 use crate::grounding::{Abstractor, resolve, without_locations};
-use crate::language::{Clause, Exemplar, LiftedArg, LiftedProgram, LiftedStep, Program, Symbol};
+use crate::language::{
+    Clause, Exemplar, LiftedArg, LiftedProgram, LiftedStep, Program, Roles, Symbol,
+};
 use crate::world::Domain;
 
 /// What a lesson becomes for the parser: its utterance and its program, both lifted (paper,
@@ -48,9 +50,19 @@ fn lift_clause<D: Domain>(
         .map(|(types, said)| types.iter().chain(&said.types).find(acts_on).or(types.first()))
         .collect();
     let held = domain.held(&lesson.scene).filter(|_| recipe.settings().lifting.held);
+    // "In the sink" says how, not what: another wording need not say it. But where a task ends is
+    // said of each thing anew.
+    let lexicon = domain.lexicon();
+    let keeps = recipe.settings().abstraction.lists.is_some();
+    let goal = goal(&lexicon.roles, &lesson.program);
+    let stays = |arg: &Symbol| {
+        let word = lexicon.fixtures.get(arg).filter(|_| keeps && goal != Some(arg));
+        word.is_some_and(|word| lexicon.fixtures.values().filter(|w| *w == word).count() == 1)
+    };
     let lift_arg = |arg: &Symbol| {
         // Of two mentions of one type, the first is it: "the mug on the table beside the mug".
         match meant.iter().position(|kind| *kind == Some(arg)) {
+            Some(_) if stays(arg) => LiftedArg::Constant(arg.clone()),
             Some(place) => LiftedArg::Slot {
                 sort: clause.mentions[place].sort.clone(),
                 number: place as u8 + 1,
@@ -60,6 +72,15 @@ fn lift_clause<D: Domain>(
         }
     };
     lift_program(&lesson.program, lift_arg)
+}
+
+/// Where a program that fetches something leaves it at the end.
+fn goal<'p>(roles: &Roles, program: &'p Program) -> Option<&'p Symbol> {
+    let fetches =
+        program.steps.iter().find(|s| roles.takes(&s.operator) || roles.puts(&s.operator));
+    fetches.filter(|first| roles.takes(&first.operator))?;
+    let last = program.steps.iter().rfind(|s| roles.takes(&s.operator) || roles.puts(&s.operator));
+    last.filter(|last| roles.puts(&last.operator))?.args.last()
 }
 
 fn lift_program(program: &Program, lift_arg: impl Fn(&Symbol) -> LiftedArg) -> LiftedProgram {

@@ -95,7 +95,7 @@ impl Mind {
             let reason = format!("the mind was trained on other seeds than the {}'s", domain.id());
             return Err(TrainError::Unreadable { reason });
         }
-        let parser = AnyParser::restore(recipe, &exemplars, parser)?;
+        let parser = AnyParser::restore(recipe, domain, &exemplars, parser)?;
         let features = domain.feature_count();
         let restore = |weights| Reranker::restore(recipe.words(), weights, features);
         let reranker = reranker.map(restore).transpose();

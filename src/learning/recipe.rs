@@ -2,11 +2,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::grounding::{Abstraction, Execution, RerankerSettings};
+use crate::grounding::{Abstraction, Execution, RerankerSettings, Split};
 use crate::ids::Digest;
 use crate::language::Document;
 use crate::numerics::NumericsVersion;
-use crate::parser::{ExemplarSettings, WordTable};
+use crate::parser::{ExemplarSettings, FeaturesSettings, WordTable};
 
 /// Settings only, with a digest: everything that decides what a mind becomes, beside the lessons.
 #[derive(Debug, Clone)]
@@ -51,7 +51,10 @@ pub struct Lifting {
 #[serde(deny_unknown_fields)]
 pub struct ParserSettings {
     pub kind: ParserKind,
-    pub exemplar: ExemplarSettings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exemplar: Option<ExemplarSettings>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub features: Option<FeaturesSettings>,
 }
 
 /// The parsers there are.
@@ -60,6 +63,8 @@ pub struct ParserSettings {
 pub enum ParserKind {
     /// The paper's: an embedding network and the nearest exemplars.
     Exemplar,
+    /// Judges with features and weights learned once; nothing trained per person but thresholds.
+    Features,
 }
 
 /// A recipe file as it stands: its name is no setting and not part of the digest.
@@ -186,12 +191,38 @@ impl RecipeSettings {
         };
         real("learning_rate", reranker.learning_rate, 1.0)?;
         real("stop_below", reranker.stop_below, 100.0)?;
-        self.parser.exemplar.check().map_err(|fault| match fault {
-            crate::parser::TrainFault::Setting { field, .. } => {
-                ("parser.exemplar", field, fault.to_string())
+        self.check_parser()
+    }
+
+    fn check_parser(&self) -> Result<(), (&'static str, &'static str, String)> {
+        let ParserSettings { kind, exemplar, features } = &self.parser;
+        if self.abstraction.split == Split::Verbs && self.abstraction.lists.is_none() {
+            let reason = "split is \"verbs\"; expected a section [abstraction.lists], which says \
+                          what is a verb";
+            return Err(("abstraction", "split", reason.to_owned()));
+        }
+        let absent = |section: &str| {
+            let reason = format!("expected a section [{section}] with the settings of that kind");
+            Err(("parser", "kind", reason))
+        };
+        match (kind, exemplar, features) {
+            (ParserKind::Exemplar, None, _) => absent("parser.exemplar"),
+            (ParserKind::Features, _, None) => absent("parser.features"),
+            (ParserKind::Features, _, _) if self.abstraction.lists.is_none() => {
+                absent("abstraction.lists")
             }
-            other => ("parser.exemplar", "", other.to_string()),
-        })
+            (ParserKind::Exemplar, Some(exemplar), _) => {
+                exemplar.check().map_err(|fault| match fault {
+                    crate::parser::TrainFault::Setting { field, .. } => {
+                        ("parser.exemplar", field, fault.to_string())
+                    }
+                    other => ("parser.exemplar", "", other.to_string()),
+                })
+            }
+            (ParserKind::Features, _, Some(features)) => {
+                features.check().map_err(|(field, reason)| ("parser.features", field, reason))
+            }
+        }
     }
 }
 
@@ -286,7 +317,7 @@ mod tests {
         };
         check("spelling = false", "speling = false", "expected one of `adjectives`");
         check("spelling = false", "spelling = 3", "expected a boolean");
-        check("split = \"and\"", "split = \"often\"", "expected `and` or `clauses`");
+        check("split = \"and\"", "split = \"often\"", "expected one of `and`, `clauses`, `verbs`");
         check("name = \"tiny\"", "name = \"ti ny\"", "expected 1 to 64 letters");
         check("table = \"paper\"", "table = \"none\"", "there is no word table \"none\"");
         check("kind = \"exemplar\"", "kind = \"oracle\"", "expected `exemplar`");

@@ -30,13 +30,15 @@ pub fn train<D: Domain>(
     let mut exemplars = seeds.exemplars.clone();
     exemplars.extend(lessons.iter().map(|lesson| lift(domain, recipe, lesson)));
 
-    let (parser, figures) = AnyParser::train(recipe, seed(recipe, "parser"), &exemplars, seeds)?;
+    let (parser, figures) = AnyParser::train(recipe, domain, seed(recipe, "parser"), &exemplars)?;
     seeds_keep_their_programs(&parser, &seeds.exemplars, lessons)?;
     let report =
         Report { exemplars: exemplars.len() as u32, threshold: parser.threshold(), figures };
     let seed_count = seeds.exemplars.len() as u32;
     let mut mind = Mind::new(recipe.clone(), parser, None, seed_count, report);
-    if lessons.is_empty() {
+    // A parser that is sure of its order asks a reranker only where one form has two programs.
+    let never_asked = mind.parser.sure_of_order() && !clashes(&exemplars);
+    if lessons.is_empty() || never_asked {
         return Ok(mind);
     }
 
@@ -67,6 +69,15 @@ fn seed(recipe: &Recipe, part: &str) -> Digest {
     hasher.update(&recipe.digest().0);
     hasher.update(part.as_bytes());
     Digest(*hasher.finalize().as_bytes())
+}
+
+/// Whether two exemplars with the same lifted form have different programs.
+fn clashes(exemplars: &[Exemplar]) -> bool {
+    let mut sorted: Vec<&Exemplar> = exemplars.iter().collect();
+    sorted.sort_by_key(|exemplar| &exemplar.utterance);
+    sorted
+        .windows(2)
+        .any(|two| two[0].utterance == two[1].utterance && two[0].program != two[1].program)
 }
 
 /// Everything that programs may consist of.

@@ -4,6 +4,18 @@ use crate::language::{Clause, LiftedProgram, Near};
 pub trait SemanticParser {
     /// Candidate programs for one clause, all within the parser's own threshold.
     fn parse(&self, clause: &Clause) -> Parse;
+
+    /// How far a chain of clauses is, from how far its first clauses and the next one are. As sure
+    /// as its weakest link, unless a parser knows better.
+    fn chain(&self, so_far: f32, next: f32) -> f32 {
+        so_far.max(next)
+    }
+
+    /// Whether the nearest candidate that runs is the one to take, and a reranker is only asked
+    /// where several are equally near.
+    fn sure_of_order(&self) -> bool {
+        false
+    }
 }
 
 /// What a parser found.
@@ -16,8 +28,8 @@ pub struct Parse {
     pub nearest: Vec<Near>,
     /// What the distances were held against.
     pub threshold: f32,
-    /// How many of the candidates come from exemplars with exactly this lifted form. They come
-    /// first and beat the reranker.
+    /// How many of the candidates come from exemplars with exactly this lifted form, or are so
+    /// near that no other reading counts. They come first and beat the reranker.
     pub exact: usize,
 }
 
@@ -27,4 +39,7 @@ pub struct Scored {
     pub distance: f32,
     /// The exemplar that gave it.
     pub number: u32,
+    /// Whether the slots are only kinds of arguments: which mention fills which is then for the
+    /// world to say. Otherwise slot n is the n-th mention.
+    pub open: bool,
 }

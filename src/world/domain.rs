@@ -58,6 +58,17 @@ pub trait Domain: Send + Sync + 'static {
     /// The type of what the robot holds.
     fn held(&self, scene: &Self::Scene) -> Option<Symbol>;
 
+    /// The type of what the robot stands at.
+    fn here(&self, _scene: &Self::Scene) -> Option<Symbol> {
+        None
+    }
+
+    /// Whether things of a type can ever be the `place`-th (0-based) argument of the operator,
+    /// whatever the scene.
+    fn fits(&self, _operator: &Symbol, _place: usize, _kind: &Symbol) -> bool {
+        true
+    }
+
     /// How many numbers [`Domain::features`] returns.
     fn feature_count(&self) -> usize;
 

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use crate::language::{Exemplar, LiftedUtterance, Symbol};
+use crate::language::{Exemplar, Habits, LiftedUtterance, Roles, Symbol};
 
 /// What things are called. Shared by a domain's users; people teach requests, not names.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,6 +18,10 @@ pub struct Lexicon {
     pub adjectives: Vec<String>,
     /// Types whose word is worth keeping beside their slot, with that word: `SinkBasin` → `sink`.
     pub fixtures: BTreeMap<Symbol, String>,
+    /// How recorded people used words for the domain's operators; none where nobody was recorded.
+    pub habits: Option<Arc<Habits>>,
+    /// Which operators go, take, put and open.
+    pub roles: Roles,
 }
 
 /// One thing that a name may mean.

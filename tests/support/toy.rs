@@ -59,6 +59,7 @@ impl Bells {
             pronouns: vec!["it".to_owned()],
             adjectives: Vec::new(),
             fixtures: BTreeMap::new(),
+            ..Lexicon::default()
         };
         let seeds = SeedSet {
             exemplars: exemplars(&[

@@ -127,6 +127,21 @@ impl Domain for Household {
         scene.robot.holds.map(|index| scene.object(index).kind.symbol().clone())
     }
 
+    fn here(&self, scene: &Scene) -> Option<Symbol> {
+        scene.robot.at.map(|index| scene.object(index).kind.symbol().clone())
+    }
+
+    fn fits(&self, operator: &Symbol, place: usize, kind: &Symbol) -> bool {
+        let Some(kind) = Kind::named(kind.as_str()) else { return false };
+        match (operator.as_str(), place) {
+            ("PICKUP" | "PUT", 0) => kind.pickupable(),
+            ("PUT", _) => kind.receptacle(),
+            ("TOGGLE", _) => kind.toggleable(),
+            ("OPEN" | "CLOSE", _) => kind.openable(),
+            _ => true,
+        }
+    }
+
     fn feature_count(&self) -> usize {
         FEATURE_COUNT
     }

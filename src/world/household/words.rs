@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::Deserialize;
 
 use super::facts::{embedded, facts};
-use crate::language::{Exemplar, LiftedUtterance, Symbol};
+use crate::language::{Exemplar, Habits, LiftedUtterance, Roles, Symbol};
 use crate::world::{Lexicon, Meaning, SeedSet};
 
 /// The sort of every argument: a household has one.
@@ -15,6 +16,13 @@ struct Words {
     adjectives: Vec<String>,
     plurals: BTreeMap<String, String>,
     fixtures: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+struct Counts {
+    order: Vec<String>,
+    clauses: Vec<u32>,
+    words: BTreeMap<String, Vec<u32>>,
 }
 
 #[derive(Deserialize)]
@@ -50,7 +58,23 @@ pub(super) fn lexicon() -> Lexicon {
             .into_iter()
             .map(|(kind, word)| (known(&kind).symbol().clone(), word))
             .collect(),
+        habits: Some(Arc::new(habits())),
+        roles: Roles {
+            going: Some(Symbol::new("GOTO")),
+            taking: Some(Symbol::new("PICKUP")),
+            putting: Some(Symbol::new("PUT")),
+            doors: vec![Symbol::new("OPEN"), Symbol::new("CLOSE")],
+        },
     }
+}
+
+/// How recorded people used words for the primitives, from `habits.toml`.
+fn habits() -> Habits {
+    let Counts { order, clauses, words } =
+        embedded("habits.toml", include_str!("../../../data/household/habits.toml"));
+    let whole = words.values().chain([&clauses]).all(|row| row.len() == order.len());
+    assert!(whole, "habits.toml counts each word for each primitive");
+    Habits { order: order.iter().map(|name| Symbol::new(name)).collect(), clauses, words }
 }
 
 /// Whether fewer than one in fifteen uses of the name mean this kind ("bowl" for a cup).

@@ -1,0 +1,267 @@
+use std::collections::BTreeSet;
+
+use crate::language::{
+    Clause, Grammar, LiftedArg, LiftedProgram, Mention, Program, Roles, Step, Symbol, Word,
+    WordLists,
+};
+use crate::world::Domain;
+
+/// Which things fill the slots of an open program, by what the world allows: the first mention, in
+/// the order of the words, of a type that the operator can ever act on.
+///
+/// A name that could be the argument is never passed over, whether or not it is in the scene:
+/// "take the spatula from the plate" without a spatula is not about the plate.
+pub struct Arguments<'a, D: Domain> {
+    pub domain: &'a D,
+    pub lists: &'a WordLists,
+    pub clause: &'a Clause,
+    /// Per mention the types it may mean here, best first.
+    pub types: &'a [Vec<Symbol>],
+    pub held: Option<Symbol>,
+    /// What the robot stands at.
+    pub here: Option<Symbol>,
+    /// What was named last before this clause.
+    pub last: Option<&'a Symbol>,
+}
+
+/// A way to fill an open program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filling {
+    /// To be tried in order: they differ in types that share a name.
+    pub programs: Vec<Program>,
+    /// How far the choice is from the obvious one; 0 is obvious.
+    pub penalty: f32,
+}
+
+/// Words after which a place is meant, when the thing itself is not named.
+const ONTO: [&str; 3] = ["on", "onto", "to"];
+/// Particles that may stand between a verb and its object.
+const PASSED: [&str; 5] = ["up", "down", "back", "away", "both"];
+
+impl<D: Domain> Arguments<'_, D> {
+    /// - returns: `None` when the words leave a slot open.
+    pub fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
+        let roles = &self.domain.lexicon().roles;
+        let slot = |arg: &LiftedArg| matches!(arg, LiftedArg::Slot { .. });
+        match program.steps.as_slice() {
+            [step] if step.args.iter().all(slot) => match step.args.len() {
+                1 => self.one(roles, &step.operator),
+                2 if roles.puts(&step.operator) => self.put(&step.operator),
+                _ => self.in_turn(roles, program),
+            },
+            _ => self.in_turn(roles, program),
+        }
+    }
+
+    fn one(&self, roles: &Roles, operator: &Symbol) -> Option<Filling> {
+        if roles.goes(operator) {
+            return self.goal(operator);
+        }
+        let named = self.types.len();
+        for (place, kinds) in self.types.iter().enumerate() {
+            let fitting = self.fitting(operator, 0, kinds);
+            if !fitting.is_empty() {
+                return Some(filling(operator, fitting, place as f32));
+            }
+            if roles.is_door(operator) && self.is_pronoun(place) {
+                let here = self.fitting(operator, 0, self.here.as_slice());
+                return Some(filling(operator, here, place as f32))
+                    .filter(|f| !f.programs.is_empty());
+            }
+            if roles.takes(operator) && self.names_unknown() {
+                return None;
+            }
+        }
+        if named > 0 {
+            return None;
+        }
+        let (unnamed, penalty) = match () {
+            () if roles.is_door(operator) => (self.here.as_ref(), 0.0),
+            () if roles.takes(operator) && !self.names_unknown() => (self.last, 1.0),
+            () => (None, 0.0),
+        };
+        let fitting = self.fitting(operator, 0, unnamed.cloned().as_slice());
+        Some(filling(operator, fitting, penalty)).filter(|f| !f.programs.is_empty())
+    }
+
+    /// The first mention that something goes "to", else the first.
+    fn goal(&self, operator: &Symbol) -> Option<Filling> {
+        let mut order: Vec<(bool, usize)> = Vec::new();
+        let mut before: Vec<&str> = Vec::new();
+        for word in &self.clause.lifted.words {
+            match word {
+                Word::Text(text) => before.push(text),
+                Word::Slot { .. } => {
+                    let directed = before.iter().any(|word| self.lists.toward.contains(*word));
+                    if directed && before.contains(&"where") {
+                        // "Back to where the potato is": the place, not the potato.
+                        return None;
+                    }
+                    order.push((!directed, order.len()));
+                    before.clear();
+                }
+            }
+        }
+        order.sort_unstable();
+        let alone = order.len() == 1;
+        order.into_iter().find_map(|(_, place)| {
+            let kinds = self.types.get(place)?.iter();
+            let kinds: Vec<Symbol> =
+                kinds.filter(|kind| alone || self.held.as_ref() != Some(kind)).cloned().collect();
+            Some(filling(operator, kinds, 0.0)).filter(|filling| !filling.programs.is_empty())
+        })
+    }
+
+    /// What is in the hand goes to the place that is named, else to where the robot stands.
+    fn put(&self, operator: &Symbol) -> Option<Filling> {
+        let held = self.held.clone()?;
+        let named = self.types.len();
+        let says = |word: &str| {
+            self.clause.lifted.words.iter().any(|w| matches!(w, Word::Text(text) if text == word))
+        };
+        let is_own = |place: &usize| {
+            self.is_pronoun(*place) || self.said(*place).is_some_and(|m| m.types.contains(&held))
+        };
+        let mut own = (0..named).find(is_own);
+        let mut penalty = 0.0;
+        if own.is_none() && !self.names_unknown() {
+            let placed = ONTO.iter().any(|word| says(word))
+                || self.lists.inside.iter().any(|word| says(word));
+            match named {
+                0 => return None,
+                1 if placed => penalty = 1.0,
+                1 => return None,
+                _ => (own, penalty) = (Some(0), 2.0),
+            }
+        }
+        let put = |place: &Symbol| Program {
+            steps: vec![Step {
+                operator: operator.clone(),
+                args: vec![held.clone(), place.clone()],
+            }],
+        };
+        let rest: Vec<usize> = (0..named).filter(|place| Some(*place) != own).collect();
+        for (skipped, place) in rest.iter().enumerate() {
+            let kinds = match self.is_pronoun(*place) {
+                true => self.here.as_slice(),
+                false => self.types[*place].as_slice(),
+            };
+            let mut kinds = self.fitting(operator, 1, kinds);
+            kinds.retain(|kind| *kind != held);
+            if !kinds.is_empty() {
+                let programs = kinds.iter().map(put).collect();
+                return Some(Filling { programs, penalty: penalty + 0.5 * skipped as f32 });
+            }
+        }
+        let here = self.fitting(operator, 1, self.here.as_slice());
+        let here = here.first().filter(|kind| **kind != held)?;
+        let penalty = if rest.is_empty() { penalty } else { penalty + 1.0 };
+        Some(Filling { programs: vec![put(here)], penalty })
+    }
+
+    /// Each slot in turn takes the first mention left that fits everything it is used for; what is
+    /// taken or put is what is in the hand, if there is something.
+    fn in_turn(&self, roles: &Roles, program: &LiftedProgram) -> Option<Filling> {
+        let mut used = BTreeSet::new();
+        let mut meant: Vec<Option<Symbol>> = vec![None; program.slots()];
+        let constants: BTreeSet<&Symbol> = args(program)
+            .filter_map(|(_, _, arg)| match arg {
+                LiftedArg::Constant(kind) => Some(kind),
+                _ => None,
+            })
+            .collect();
+        for number in 1..=program.slots() {
+            let uses: Vec<(&Symbol, usize)> = args(program)
+                .filter(|(_, _, arg)| {
+                    matches!(arg, LiftedArg::Slot { number: n, .. } if *n as usize == number)
+                })
+                .map(|(operator, place, _)| (operator, place))
+                .collect();
+            if uses.is_empty() {
+                continue;
+            }
+            let fits = |kind: &&Symbol| {
+                uses.iter().all(|(operator, place)| self.domain.fits(operator, *place, kind))
+            };
+            let moved =
+                uses.iter().any(|(o, place)| *place == 0 && (roles.takes(o) || roles.puts(o)));
+            if let Some(held) = self.held.as_ref().filter(fits).filter(|_| moved) {
+                let own = (0..self.types.len())
+                    .find(|&place| self.is_pronoun(place) || self.types[place].contains(held));
+                used.extend(own);
+                meant[number - 1] = Some(held.clone());
+                continue;
+            }
+            let free = |constants: bool| {
+                (0..self.types.len()).filter(|place| !used.contains(place)).find_map(|place| {
+                    let other =
+                        |kind: &&Symbol| !meant.iter().flatten().any(|taken| taken == *kind);
+                    let kinds = self.types[place].iter().filter(fits).filter(other);
+                    let mut kinds =
+                        kinds.filter(|kind| constants || !self.is_constant(kind, program));
+                    Some((place, kinds.next()?.clone()))
+                })
+            };
+            // What does not fit is said to be so by the world: "a Fridge cannot be picked up".
+            let unfit = || {
+                let mut left = (0..self.types.len()).filter(|place| !used.contains(place));
+                left.find_map(|place| Some((place, self.types[place].first()?.clone())))
+            };
+            let (place, kind) = free(constants.is_empty()).or_else(|| free(true)).or_else(unfit)?;
+            used.insert(place);
+            meant[number - 1] = Some(kind);
+        }
+        let spare = self.held.clone().or_else(|| meant.iter().flatten().next().cloned());
+        let meant: Vec<Symbol> =
+            meant.into_iter().map(|kind| kind.or(spare.clone())).collect::<Option<_>>()?;
+        let program = program.fill(&meant, self.held.as_ref())?;
+        Some(Filling { programs: vec![program], penalty: 0.0 })
+    }
+
+    fn is_constant(&self, kind: &Symbol, program: &LiftedProgram) -> bool {
+        args(program).any(|(_, _, arg)| matches!(arg, LiftedArg::Constant(other) if other == kind))
+    }
+
+    fn fitting(&self, operator: &Symbol, place: usize, kinds: &[Symbol]) -> Vec<Symbol> {
+        kinds.iter().filter(|kind| self.domain.fits(operator, place, kind)).cloned().collect()
+    }
+
+    fn said(&self, place: usize) -> Option<&Mention> {
+        self.clause.mentions.get(place)
+    }
+
+    fn is_pronoun(&self, place: usize) -> bool {
+        self.said(place).is_some_and(|mention| mention.pronoun)
+    }
+
+    /// Whether words that name nothing known stand between the verb and the first preposition.
+    fn names_unknown(&self) -> bool {
+        let adjectives = &self.domain.lexicon().adjectives;
+        let grammar = Grammar { lists: self.lists, adjectives };
+        let words = &self.clause.lifted.words;
+        let after = grammar.main_verb(words).map_or(0, |verb| verb.at + 1);
+        let first = words[after..].iter().find(|word| match word {
+            Word::Slot { .. } => true,
+            Word::Text(text) => {
+                !self.lists.determiners.contains(text)
+                    && !grammar.is_adjective(text)
+                    && !PASSED.contains(&text.as_str())
+            }
+        });
+        matches!(first, Some(Word::Text(text)) if !self.lists.stop.contains(text))
+    }
+}
+
+/// Every argument with its operator and 0-based place.
+fn args(program: &LiftedProgram) -> impl Iterator<Item = (&Symbol, usize, &LiftedArg)> {
+    program.steps.iter().flat_map(|step| {
+        step.args.iter().enumerate().map(|(place, arg)| (&step.operator, place, arg))
+    })
+}
+
+fn filling(operator: &Symbol, kinds: Vec<Symbol>, penalty: f32) -> Filling {
+    let program = |kind: Symbol| Program {
+        steps: vec![Step { operator: operator.clone(), args: vec![kind] }],
+    };
+    Filling { programs: kinds.into_iter().map(program).collect(), penalty }
+}

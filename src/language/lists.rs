@@ -1,0 +1,52 @@
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+/// Words of a language that are known by what they do in a clause, not by what they mean. Data of
+/// a recipe, so another language is another file.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WordLists {
+    /// Carry no meaning of their own.
+    pub silent: BTreeSet<String>,
+    pub determiners: BTreeSet<String>,
+    pub particles: BTreeSet<String>,
+    /// Particles that make another verb of a verb: "turn on", "pick up".
+    pub verb_particles: BTreeSet<String>,
+    pub adverbs: BTreeSet<String>,
+    /// May stand between two clauses.
+    pub joints: BTreeSet<String>,
+    /// Where an utterance is cut, if a verb follows. Marks cut as well.
+    pub cuts: BTreeSet<String>,
+    pub stop: BTreeSet<String>,
+    /// A part of a thing is the thing: "a slice of the apple", "apple slices".
+    pub portions: BTreeSet<String>,
+    /// Nouns as well: verbs only where an object follows.
+    pub noun_verbs: BTreeSet<String>,
+    /// Before a mention: it is where something goes.
+    pub toward: BTreeSet<String>,
+    pub inside: BTreeSet<String>,
+    /// Open a phrase that says how things stand, not what to do: "while holding the card".
+    pub standing: BTreeSet<String>,
+    /// Verbs of moving that need no goal: "turn around".
+    pub moving: BTreeSet<String>,
+    pub verbs: BTreeSet<String>,
+}
+
+impl WordLists {
+    /// closing: close; picking: pick; putting: put.
+    pub fn base(&self, word: &str) -> String {
+        let stem = word.strip_suffix("ing").filter(|_| !self.verbs.contains(word));
+        let Some(stem) = stem else { return word.to_owned() };
+        let doubled = stem.char_indices().last().map_or("", |(end, _)| &stem[..end]);
+        let forms = [stem.to_owned(), format!("{stem}e"), doubled.to_owned()];
+        let known = |form: &&String| self.verbs.contains(*form) || self.noun_verbs.contains(*form);
+        forms.iter().find(known).cloned().unwrap_or_else(|| word.to_owned())
+    }
+
+    /// Whether a word names a part of a thing, in the singular or plural.
+    pub fn is_portion(&self, word: &str) -> bool {
+        let singular = word.strip_suffix('s').unwrap_or(word);
+        self.portions.contains(word) || self.portions.contains(singular)
+    }
+}
