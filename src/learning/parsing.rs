@@ -13,8 +13,8 @@ use crate::world::Domain;
 /// The parser of a mind, of the kind that its recipe names.
 #[derive(Debug, Clone)]
 pub enum AnyParser {
-    Exemplar(ExemplarParser),
-    Features(FeaturesParser),
+    Exemplar(Box<ExemplarParser>),
+    Features(Box<FeaturesParser>),
 }
 
 /// What a parser of some kind learned, for storing.
@@ -39,13 +39,13 @@ impl AnyParser {
         let trained = match recipe.settings().parser.kind {
             ParserKind::Exemplar => {
                 ExemplarParser::train(exemplar(recipe)?, words, seed, exemplars, calibration)
-                    .map(|(parser, figures)| (AnyParser::Exemplar(parser), figures))
+                    .map(|(parser, figures)| (AnyParser::Exemplar(Box::new(parser)), figures))
             }
             ParserKind::Features => {
                 let (settings, background) = features(recipe, domain)?;
                 let count = seeds.exemplars.len();
                 FeaturesParser::train(settings, words, background, exemplars, count, calibration)
-                    .map(|(parser, figures)| (AnyParser::Features(parser), figures))
+                    .map(|(parser, figures)| (AnyParser::Features(Box::new(parser)), figures))
             }
         };
         trained.map_err(TrainError::failed)
@@ -62,13 +62,13 @@ impl AnyParser {
         let restored = match (recipe.settings().parser.kind, weights) {
             (ParserKind::Exemplar, ParserWeights::Exemplar(weights)) => {
                 ExemplarParser::restore(exemplar(recipe)?, words, exemplars, weights)
-                    .map(AnyParser::Exemplar)
+                    .map(|parser| AnyParser::Exemplar(Box::new(parser)))
             }
             (ParserKind::Features, ParserWeights::Features(weights)) => {
                 let (settings, background) = features(recipe, domain)?;
                 let seeds = domain.seeds().exemplars.len();
                 FeaturesParser::restore(settings, words, background, exemplars, seeds, weights)
-                    .map(AnyParser::Features)
+                    .map(|parser| AnyParser::Features(Box::new(parser)))
             }
             _ => {
                 let reason = "the weights are of another kind of parser than the recipe's";
