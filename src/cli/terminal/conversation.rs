@@ -234,11 +234,15 @@ impl<'a> Conversation<'a> {
                 self.tell_one(&format!("Forgotten: #{lesson}, \"{utterance}\"."))?;
             }
         }
-        Ok(Flow::On)
+        let trains = |told: &Told| matches!(told, Told::Learning { .. });
+        match reply.iter().flat_map(|reply| &reply.told).any(trains) {
+            true => self.learning(),
+            false => Ok(Flow::On),
+        }
     }
 
     /// Waits for the new mind.
-    fn learning(&mut self) -> Result<Flow, Failure> {
+    pub(super) fn learning(&mut self) -> Result<Flow, Failure> {
         let spinner = match self.screen.style() {
             Style::Screen => ProgressBar::new_spinner().with_message("learning ..."),
             Style::Lines => ProgressBar::hidden(),

@@ -121,7 +121,9 @@ impl Conversation<'_> {
         self.skipped.clear();
         // A refusal here would be refused for ever: better one sentence than a loop.
         self.robot.finish_teaching().map_err(Failure::failed)?;
-        Ok(Flow::On)
+        // A small training may be over before anybody asks: its end is waited for here, not where
+        // the phase is looked at.
+        self.learning()
     }
 }
 
