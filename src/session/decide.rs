@@ -245,7 +245,8 @@ fn clash<D: Domain>(session: &Session<D>, lesson: &Lesson<D::Scene, D::Task>) ->
         (exemplar, Some(live.seq))
     });
     let collides = |old: &Exemplar| {
-        old.utterance == new.utterance && old.program.canonical() != new.program.canonical()
+        // Numbering counts here: of the same words, "put 1 in 2" and "put 2 in 1" are two meanings.
+        old.utterance == new.utterance && old.program != new.program
     };
     let (old, lesson) = seeds.chain(lessons).find(|(old, _)| collides(old))?;
     Some(Clash { utterance: old.utterance, program: old.program, lesson })
