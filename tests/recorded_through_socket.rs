@@ -26,7 +26,7 @@ struct Row {
     suspect: Option<bool>,
 }
 
-/// Sentences that mean one primitive alone, every hundred-and-first of them.
+/// Sentences that mean one primitive alone, from every seventh line.
 fn sentences(path: &Path) -> Vec<(String, Step)> {
     let file = std::fs::File::open(path).unwrap();
     let mut wanted: BTreeMap<&str, usize> = SENTENCES.into();
