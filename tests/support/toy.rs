@@ -49,6 +49,14 @@ impl Bells {
         Bells { brittle: true, ..Bells::new() }
     }
 
+    /// A world without a word for breaking, so that no training can come to it.
+    pub fn sturdy() -> Bells {
+        let mut bells = Bells::new();
+        bells.signature.operators.retain(|operator| operator.name.as_str() != "BREAK");
+        bells.seeds.exemplars.retain(|seed| !seed.utterance.to_string().starts_with("break"));
+        bells
+    }
+
     pub fn new() -> Bells {
         let operator = |name| Operator { name: Symbol::new(name), args: vec![Symbol::new("obj")] };
         let meaning = |kind: &str| Meaning { sort: "obj".into(), kind: kind.into(), count: 1 };

@@ -1,6 +1,7 @@
 //! The one tool of the house. `cargo xtask test` is what CI runs.
 
 mod budget;
+mod drills;
 mod machine;
 mod stage;
 
@@ -24,6 +25,17 @@ enum Task {
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
     },
+    /// The simulator: as many seeds as wanted, in the release build.
+    ///
+    /// Example: cargo xtask simulate --seeds 1000000
+    Simulate {
+        /// How many seeds; one when only --seed is given.
+        #[arg(long)]
+        seeds: Option<u64>,
+        /// The first seed.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
     /// The benchmarks behind docs/performance.md.
     Bench {
         /// Passed to `cargo bench`.
@@ -34,6 +46,7 @@ enum Task {
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Test { only } => stage::run_all(&only),
+        Task::Simulate { seeds, seed } => drills::simulate(seeds.unwrap_or(1), seed),
         Task::Bench { filter } => stage::bench(filter.as_deref()),
     };
     match done {

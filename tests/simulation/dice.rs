@@ -1,0 +1,41 @@
+//! What a seed decides.
+
+use apprentice::numerics::Rng;
+
+pub struct Dice(Rng);
+
+impl Dice {
+    pub fn new(seed: u64) -> Dice {
+        Dice(Rng::from_u64(seed))
+    }
+
+    /// Below `end`, which is not 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.0.next_u64() % end as u64) as usize
+    }
+
+    /// True in `percent` of 100 cases.
+    pub fn chance(&mut self, percent: usize) -> bool {
+        self.below(100) < percent
+    }
+
+    pub fn of<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
+        &choices[self.below(choices.len())]
+    }
+
+    pub fn next(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+
+    /// The number of one of `weights`, each as likely as it is heavy.
+    pub fn weighted<T: Copy>(&mut self, choices: &[(usize, T)]) -> T {
+        let mut roll = self.below(choices.iter().map(|(weight, _)| weight).sum());
+        for &(weight, choice) in choices {
+            if roll < weight {
+                return choice;
+            }
+            roll -= weight;
+        }
+        unreachable!("the roll is below the sum of the weights")
+    }
+}
