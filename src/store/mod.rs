@@ -4,6 +4,7 @@ mod cache;
 mod checks;
 pub mod conformance;
 mod copy;
+mod drill;
 mod entropy;
 mod faulty;
 mod files;

@@ -167,13 +167,13 @@ impl House {
         let mut share = |most: usize| dice.below(most + 1) as u32;
         let plan = FaultPlan {
             seed,
-            script: Vec::new(),
             refused: share(80),
             unacknowledged: share(80),
             held_answers: share(150),
             held_appends: share(150),
             crashes_before: share(12),
             crashes_after: share(12),
+            ..FaultPlan::default()
         };
         let faulty = Arc::new(FaultyLog::new(inner.clone(), plan));
         let disturbed = Arc::new(Disturbed::new(faulty.clone()));

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::embedded;
+use super::embedded::{self, Wanted};
 use super::failure::Failure;
 use crate::service::{Data, Service};
 pub use file::{PlayedFile, TranscriptFile};
@@ -84,7 +84,7 @@ impl Services {
     fn play(&mut self, file: &TranscriptFile) -> Result<PlayedFile, Failure> {
         let recipe = file.recipe_text()?;
         if !self.by_recipe.contains_key(&recipe) {
-            let service = embedded::start(Data::Memory, recipe.clone(), Vec::new())?;
+            let service = embedded::start(Wanted::inside(Data::Memory, recipe.clone()))?;
             self.by_recipe.insert(recipe.clone(), service);
         }
         let service = &self.by_recipe[&recipe];
