@@ -4,6 +4,7 @@
 //! A parser is given what a person's sentence and the scene would give it; everything else a
 //! corpus knows is for judging the answer.
 
+pub mod ablation;
 pub mod corpus;
 mod draw;
 mod episode;

@@ -61,6 +61,9 @@ impl Display for LessonsReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.base)?;
         write!(f, "{} episodes", self.episodes)?;
+        if self.lessons > 1 {
+            write!(f, ", {} lessons each", self.lessons)?;
+        }
         match self.trainings_failed.values().sum::<usize>() {
             0 => writeln!(f)?,
             failed => writeln!(f, ", {failed} with a training that failed")?,
