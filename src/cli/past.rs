@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::data_dir;
 use super::failure::Failure;
 use crate::ids::{StreamId, TenantId, UserId};
-use crate::store::{self, PrivateCopy, Store};
+use crate::store::{self, OpenError, PrivateCopy, Store};
 
 /// A store that was copied, for reading only.
 pub struct Past {
@@ -18,11 +18,16 @@ pub struct Past {
 
 /// Copies the closed data directory and opens the copy.
 ///
-/// - errors: with code 2, one sentence: there is none, it is in use, or it cannot be read.
+/// - errors: one sentence: with code 2 there is none, it is in use, or it cannot be read; with code
+///   1 records that were acknowledged are lost.
 pub fn open(flag: Option<PathBuf>) -> Result<Past, Failure> {
     let directory = data_dir::choose(flag)?;
     let copy = store::copy_private(&directory).map_err(Failure::bad_input)?;
-    let store = copy.open().map_err(Failure::bad_input)?;
+    let store = copy.open().map_err(|error| match error {
+        // Nothing is wrong with what the person asked for.
+        OpenError::Damaged { .. } | OpenError::Database { .. } => Failure::failed(error),
+        _ => Failure::bad_input(error),
+    })?;
     Ok(Past { store, directory, _copy: copy })
 }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use super::files::make_dir;
 use super::open::{lock_existing, open_log};
+use super::sled::SledCache;
 use super::{Entropy, Keys, OpenError, OsEntropy, Store};
 
-/// A copy of a data directory's log, for tools that only look: they never open the directory
-/// itself, which opening would write to. Removed when dropped.
+/// A copy of a data directory's log and caches, for tools that only look: they never open the
+/// directory itself, which opening would write to. Removed when dropped.
 ///
 /// Secrets are not copied: keys are read where they are.
 #[derive(Debug)]
@@ -18,8 +19,7 @@ pub struct PrivateCopy {
     of: PathBuf,
 }
 
-/// Copies the log of the closed data directory `dir` to a new directory of the system's temporary
-/// space.
+/// Copies the closed data directory `dir` to a new directory of the system's temporary space.
 ///
 /// - errors: it is in use, is no data directory, or cannot be read or copied.
 pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
@@ -33,6 +33,10 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     let copy = PrivateCopy { dir: target, of: dir.to_owned() };
     let copied = make_dir(&copy.dir)
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
+        .and_then(|()| match dir.join("cache").is_dir() {
+            true => copy_tree(&dir.join("cache"), &copy.dir.join("cache")),
+            false => Ok(()),
+        })
         .and_then(|()| match fs::copy(dir.join("HEADS"), copy.dir.join("HEADS")) {
             // That is for the opening to report.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -60,7 +64,7 @@ fn check_there(dir: &Path) -> Result<(), OpenError> {
 }
 
 impl PrivateCopy {
-    /// The store of the copy, with empty caches in memory; new people cannot be added to it.
+    /// The store of the copy, its cached minds included; new people cannot be added to it.
     ///
     /// Errors name the directory that was copied.
     pub fn open(&self) -> Result<Store, OpenError> {
@@ -73,9 +77,13 @@ impl PrivateCopy {
         let lock = super::open::lock(&self.dir, lock)?;
         let keys = Keys::open_read_only(&self.of.join("keys"), Arc::new(OsEntropy));
         let keys = Arc::new(keys);
-        let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock));
+        let lock = Arc::new(lock);
+        let log = open_log(&self.dir, keys.clone(), false, lock.clone());
         let log = log.map_err(|error| self.said_of_the_original(error))?;
-        Ok(Store::around(Arc::new(log), keys))
+        let cache = SledCache::open(&self.dir.join("cache"), lock).map_err(|reason| {
+            self.said_of_the_original(OpenError::Database { dir: String::new(), reason })
+        })?;
+        Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
     }
 
     /// What is wrong with the copy is wrong with the original.
