@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{converse, eval, log, serve, talk, transcript};
+use super::{audit, converse, eval, log, replay, serve, talk, transcript};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -17,6 +17,8 @@ Examples:
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada
   apprentice transcript check tests/transcripts/*.txt
   apprentice log show --data demo --user you
+  apprentice replay --data demo --user you --at 17
+  apprentice audit --data demo --repropose --retrain
 
 Exit codes:
   0  fine; the end of input is fine too
@@ -46,6 +48,8 @@ enum Verb {
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
+    Replay(replay::Arguments),
+    Audit(audit::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit code.
@@ -71,6 +75,8 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
+        Some(Verb::Replay(arguments)) => replay::run(arguments),
+        Some(Verb::Audit(arguments)) => audit::run(arguments),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The command line: one file per command, and the conversation in a terminal.
 
 mod args;
+mod audit;
 mod converse;
 mod data_dir;
 mod embedded;
@@ -8,7 +9,9 @@ mod eval;
 mod failure;
 mod log;
 mod logging;
+mod past;
 mod recipe;
+mod replay;
 mod serve;
 mod talk;
 mod terminal;

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use super::Minds;
 use crate::events::EventKind;
 use crate::ids::{Digest, Seq, StreamId};
-use crate::learning::{self, Mind};
+use crate::learning::{self, Mind, Recipe, RecipeError};
 use crate::session::{Divergence, Session, State};
 use crate::store::{ReadError, Store};
 use crate::world::Domain;
@@ -15,6 +15,11 @@ pub enum RebuildError {
     Read { stream: StreamId, error: ReadError },
     #[error("stream {stream}: {error}; was it recorded by another version of apprentice?")]
     Divergence { stream: StreamId, error: Divergence },
+    #[error(
+        "stream {stream}: the recipe that it was recorded with cannot be read: {error}; \
+         use a newer version of apprentice"
+    )]
+    Recipe { stream: StreamId, error: RecipeError },
     #[error("stream {stream}: the mind of its records has digest {recorded}, but {recomputed}")]
     Mind { stream: StreamId, recorded: Digest, recomputed: String },
     #[error("stream {stream} has {have} records; there is no record {wanted}")]
@@ -136,6 +141,12 @@ fn equip<D: Domain>(
     stream: &StreamId,
     minds: &Minds,
 ) -> Result<(), RebuildError> {
+    if let Some(opened) = &session.state().opened
+        && !session.knows_its_recipe()
+        && let Err(error) = Recipe::parse(&opened.recipe_text)
+    {
+        return Err(RebuildError::Recipe { stream: stream.clone(), error });
+    }
     if session.mind_wanted().is_some() {
         session.install(mind_of(session, store, stream, minds)?);
     }

@@ -5,32 +5,38 @@ use std::sync::Arc;
 
 use super::files::make_dir;
 use super::open::{lock_existing, open_log};
+use super::sled::SledCache;
 use super::{Entropy, Keys, OpenError, OsEntropy, Store};
 
-/// A copy of a data directory's log, for tools that only look: they never open the directory
-/// itself, which opening would write to. Removed when dropped.
+/// A copy of a data directory's log and caches, for tools that only look: they never open the
+/// directory itself, which opening would write to. Removed when dropped.
 ///
 /// Secrets are not copied: keys are read where they are.
 #[derive(Debug)]
 pub struct PrivateCopy {
     dir: PathBuf,
-    keys: PathBuf,
+    /// The directory that was copied.
+    of: PathBuf,
 }
 
-/// Copies the log of the closed data directory `dir` to a new directory of the system's temporary
-/// space.
+/// Copies the closed data directory `dir` to a new directory of the system's temporary space.
 ///
 /// - errors: it is in use, is no data directory, or cannot be read or copied.
 pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
+    check_there(dir)?;
     // Held until the copy is complete: a log that is being written would be copied torn.
     let _lock = lock_existing(dir)?;
     let mut name = [0; 8];
     OsEntropy.fill(&mut name);
     let name = format!("apprentice-{:016x}", u64::from_be_bytes(name));
     let target = std::env::temp_dir().join(name);
-    let copy = PrivateCopy { dir: target, keys: dir.join("keys") };
+    let copy = PrivateCopy { dir: target, of: dir.to_owned() };
     let copied = make_dir(&copy.dir)
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
+        .and_then(|()| match dir.join("cache").is_dir() {
+            true => copy_tree(&dir.join("cache"), &copy.dir.join("cache")),
+            false => Ok(()),
+        })
         .and_then(|()| match fs::copy(dir.join("HEADS"), copy.dir.join("HEADS")) {
             // That is for the opening to report.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -44,10 +50,23 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     Ok(copy)
 }
 
+/// - errors: there is nothing that was ever used as a data directory.
+fn check_there(dir: &Path) -> Result<(), OpenError> {
+    let absent = |found| Err(OpenError::Absent { dir: dir.display().to_string(), found });
+    match fs::read_dir(dir).map(|mut entries| entries.next().is_none()) {
+        Ok(true) => absent("the directory is empty"),
+        Ok(false) if !dir.join("LOCK").exists() => absent("it holds other files"),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => absent("nothing has that name"),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => absent("it is a file"),
+        // What else is wrong shows when it is locked.
+        _ => Ok(()),
+    }
+}
+
 impl PrivateCopy {
-    /// The store of the copy, with empty caches in memory; new people cannot be added to it.
+    /// The store of the copy, its cached minds included; new people cannot be added to it.
     ///
-    /// Errors name the copy's own directory as the place where the damage was seen.
+    /// Errors name the directory that was copied.
     pub fn open(&self) -> Result<Store, OpenError> {
         let lock = self.dir.join("LOCK");
         let lock = fs::File::create(&lock).map_err(|error| OpenError::Io {
@@ -56,9 +75,25 @@ impl PrivateCopy {
             reason: error.to_string(),
         })?;
         let lock = super::open::lock(&self.dir, lock)?;
-        let keys = Arc::new(Keys::open_read_only(&self.keys, Arc::new(OsEntropy)));
-        let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock))?;
-        Ok(Store::around(Arc::new(log), keys))
+        let keys = Keys::open_read_only(&self.of.join("keys"), Arc::new(OsEntropy));
+        let keys = Arc::new(keys);
+        let lock = Arc::new(lock);
+        let log = open_log(&self.dir, keys.clone(), false, lock.clone());
+        let log = log.map_err(|error| self.said_of_the_original(error))?;
+        let cache = SledCache::open(&self.dir.join("cache"), lock).map_err(|reason| {
+            self.said_of_the_original(OpenError::Database { dir: String::new(), reason })
+        })?;
+        Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
+    }
+
+    /// What is wrong with the copy is wrong with the original.
+    fn said_of_the_original(&self, error: OpenError) -> OpenError {
+        let dir = self.of.display().to_string();
+        match error {
+            OpenError::Database { reason, .. } => OpenError::Database { dir, reason },
+            OpenError::Damaged { damage, .. } => OpenError::Damaged { dir, damage },
+            other => other,
+        }
     }
 }
 

@@ -227,6 +227,16 @@ impl EventLog for FaultyLog {
         self.alive()?;
         self.inner.streams(tenant)
     }
+
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
+        self.alive()?;
+        self.inner.tenants()
+    }
+
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        self.alive()?;
+        self.inner.walk(stream)
+    }
 }
 
 #[cfg(test)]

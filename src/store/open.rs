@@ -45,6 +45,11 @@ pub enum OpenError {
     )]
     NotOurs { dir: String, found: String },
     #[error(
+        "there is no data directory of apprentice at {dir}: {found}; \
+         name the one that people's data was kept in"
+    )]
+    Absent { dir: String, found: &'static str },
+    #[error(
         "the data directory {dir} has layout {found}, this version of apprentice knows {LAYOUT}; \
          use a newer version"
     )]
@@ -115,7 +120,7 @@ pub fn open_memory() -> Store {
 }
 
 impl Store {
-    fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
+    pub(super) fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
         let models = Arc::new(ModelStore::new(cache.clone(), keys.clone()));
         let snapshots = Arc::new(SnapshotStore::new(cache, keys.clone()));
         Store { log, models, snapshots, keys }
@@ -307,9 +312,11 @@ mod tests {
         assert!(refusal(dir.path()).contains("thesis.tex"));
         let file = dir.path().join("thesis.tex");
         assert!(refusal(&file).contains("cannot be used"));
-        assert!(copy_refused(&file).contains("cannot be used"));
+        assert!(copy_refused(&file).contains("it is a file"));
         let empty = tempfile::tempdir().unwrap();
-        assert!(copy_refused(empty.path()).contains("cannot be used"));
+        assert!(copy_refused(dir.path()).contains("it holds other files"));
+        assert!(copy_refused(&dir.path().join("no")).contains("nothing has that name"));
+        assert!(copy_refused(empty.path()).contains("the directory is empty"));
         assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0);
     }
 

@@ -15,6 +15,7 @@ use clap::{Args, Subcommand};
 
 use super::embedded::{self, Wanted};
 use super::failure::Failure;
+use crate::language::{Evidence, Outcome};
 use crate::service::{Data, Service};
 pub use file::{PlayedFile, TranscriptFile};
 
@@ -92,6 +93,11 @@ impl Services {
         let client = service.connect(file.person(self.people)?).map_err(Failure::failed)?;
         file.play(&client)
     }
+}
+
+/// What came of an utterance, as a line of a transcript.
+pub(super) fn show_answer(outcome: &Outcome, evidence: &Evidence, actions_before: u32) -> String {
+    play::show(outcome, evidence, actions_before).1
 }
 
 fn write(text: &str) -> Result<(), Failure> {
