@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::files::make_dir;
+use super::layout::{Former, LAYOUT, LAYOUT_FILE, Standing, bring_up, standing};
 use super::open::{lock_existing, open_log};
 use super::{Entropy, Keys, OpenError, OsEntropy, Store};
 
@@ -30,6 +31,7 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     let target = std::env::temp_dir().join(name);
     let copy = PrivateCopy { dir: target, keys: dir.join("keys") };
     let copied = make_dir(&copy.dir)
+        .and_then(|()| fs::copy(dir.join(LAYOUT_FILE), copy.dir.join(LAYOUT_FILE)).map(|_| ()))
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
         .and_then(|()| match fs::copy(dir.join("HEADS"), copy.dir.join("HEADS")) {
             // That is for the opening to report.
@@ -45,7 +47,13 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
 }
 
 impl PrivateCopy {
-    /// The store of the copy, with empty caches in memory; new people cannot be added to it.
+    /// Where the copy is.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The store of the copy, with empty caches in memory; new people cannot be added to it. A copy
+    /// of a former layout is brought up; its original is not.
     ///
     /// Errors name the copy's own directory as the place where the damage was seen.
     pub fn open(&self) -> Result<Store, OpenError> {
@@ -57,7 +65,12 @@ impl PrivateCopy {
         })?;
         let lock = super::open::lock(&self.dir, lock)?;
         let keys = Arc::new(Keys::open_read_only(&self.keys, Arc::new(OsEntropy)));
+        let from = standing(&self.dir)?;
         let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock))?;
+        if let Standing::At(from @ 1..LAYOUT) = from {
+            let former = Former { dir: &self.dir, log: &log, keys: &keys, cache: None };
+            bring_up(&former, from, |_| Ok(()))?;
+        }
         Ok(Store::around(Arc::new(log), keys))
     }
 }
