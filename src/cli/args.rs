@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{converse, eval, log, serve, talk, transcript};
+use super::{converse, eval, log, self_test, serve, talk, transcript};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -46,6 +46,7 @@ enum Verb {
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
+    SelfTest(self_test::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit code.
@@ -71,6 +72,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
+        Some(Verb::SelfTest(arguments)) => self_test::run(arguments),
     }
 }
 

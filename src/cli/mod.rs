@@ -9,6 +9,7 @@ mod failure;
 mod log;
 mod logging;
 mod recipe;
+mod self_test;
 mod serve;
 mod talk;
 mod terminal;
