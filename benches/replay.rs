@@ -14,7 +14,7 @@ use apprentice::events::{Batch, Event, Head, Record};
 use apprentice::grounding::Moment;
 use apprentice::ids::{Seq, StreamId, TenantId, UserId};
 use apprentice::learning::{Recipe, train};
-use apprentice::replay::{Minds, Scrutiny, audit, rebuild_at, streams_of};
+use apprentice::replay::{Minds, Scrutiny, audit, keep_mind, rebuild_at, streams_of};
 use apprentice::session::{Outstanding, Session};
 use apprentice::store::{Store, open, open_memory};
 use apprentice::world::household::Household;
@@ -201,7 +201,7 @@ fn main() {
     for (stream, mind) in
         few.iter().flat_map(|stream| diary.minds.iter().map(move |mind| (stream, mind)))
     {
-        store.models.put(stream, mind.digest(), &mind.to_bytes()).expect("the cache takes it");
+        keep_mind(store, stream, &mind).expect("the cache takes it");
     }
     let (reproposed, counts) = timed(Scrutiny { retrain: false, repropose: true });
     println!(

@@ -8,7 +8,7 @@ use apprentice::events::{Batch, Event, Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId};
 use apprentice::language::Outcome;
 use apprentice::learning::{Recipe, train};
-use apprentice::replay::{AuditReport, Difference, Scrutiny, audit, streams_of};
+use apprentice::replay::{AuditReport, Difference, Scrutiny, audit, keep_mind, streams_of};
 use apprentice::session::Command;
 use apprentice::store::{
     AppendError, Draft, EventLog, Pending, ReadError, SeededEntropy, Store, Walk, open, open_memory,
@@ -105,7 +105,7 @@ fn missing_minds_are_trained_again_and_counted_and_cached_ones_are_not() {
     assert_eq!(report.streams[0].difference, None);
     assert_eq!(report.counts.minds_missing, 2, "one that answered in each later episode");
     let mind = diary.session.mind().unwrap();
-    store.models.put(&diary.stream, mind.digest(), &mind.to_bytes()).unwrap();
+    keep_mind(&store, &diary.stream, mind).unwrap();
     let cached = audited(&store, repropose, 1);
     assert_eq!(cached.streams[0].difference, None);
     assert!(cached.counts.minds_missing < 2, "{:?}", cached.counts);

@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId};
 use apprentice::store::conformance::{batch, read_all, stream};
-use apprentice::store::{Entropy, OsEntropy, SeededEntropy, Store, open};
+use apprentice::store::{Entropy, Origin, OsEntropy, SeededEntropy, Store, open};
 
 /// Where the child process of the kill test keeps its data.
 const CHILD_DIR: &str = "APPRENTICE_TEST_CHILD_DIR";
@@ -141,7 +141,8 @@ fn a_flipped_bit_is_harmless_or_reported_and_never_a_panic() {
             let text = format!("{person} {record} ").repeat(if record == 30 { 2_000 } else { 20 });
             head = store.log.append(&who, head, batch([text.as_str()])).wait().unwrap().head();
         }
-        store.models.put(&who, Digest::of(b"a mind"), b"a mind").unwrap();
+        let digest = Digest::of(b"a mind");
+        store.models.put(&who, &Origin::UNKNOWN, digest, b"a mind").unwrap();
     }
     let expected = everything(&store);
     drop(store);

@@ -13,7 +13,8 @@ use super::user::UserActor;
 use super::{Failure, Hello, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
-use crate::store::Store;
+use crate::replay::{Minds, Work};
+use crate::store::{CacheCounter, CacheCounts, Store};
 use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
@@ -24,6 +25,17 @@ pub struct House {
     failure: Failure,
     awake: Arc<AwakeCount>,
     lives: Arc<AwakeCount>,
+    minds: Arc<Minds>,
+    kept_minds: CacheCounter,
+    snapshots: CacheCounter,
+}
+
+/// What waking people has cost since the start, and what their caches gave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wakings {
+    pub work: Work,
+    pub minds: CacheCounts,
+    pub snapshots: CacheCounts,
 }
 
 /// What the actors are started with.
@@ -90,11 +102,14 @@ impl House {
             recipe: recipe.name().to_owned(),
         };
         let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
+        let minds = Arc::<Minds>::default();
+        let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
         let parts = Parts {
             domain,
             store,
             recipe,
             recipe_text,
+            minds: minds.clone(),
             failure: failure.clone(),
             open: lives.enter(),
         };
@@ -126,7 +141,8 @@ impl House {
         let (directory, system) = ready
             .recv()
             .map_err(|_| ActorsError::System { reason: "their thread ended at once".to_owned() })?;
-        Ok(House { directory, system, thread: Some(thread), failure, awake, lives })
+        let thread = Some(thread);
+        Ok(House { directory, system, thread, failure, awake, lives, minds, kept_minds, snapshots })
     }
 
     pub fn front(&self) -> Front {
@@ -136,6 +152,12 @@ impl House {
     /// People awake now.
     pub fn awake(&self) -> usize {
         self.awake.now()
+    }
+
+    /// What waking people has cost.
+    pub fn wakings(&self) -> Wakings {
+        let (minds, snapshots) = (self.kept_minds.now(), self.snapshots.now());
+        Wakings { work: self.minds.work(), minds, snapshots }
     }
 
     /// Sends everybody to sleep, which keeps their snapshots, and closes the store.
@@ -153,6 +175,18 @@ impl House {
         if !self.lives.wait_for_silence(FALL_ASLEEP) {
             tracing::warn!("the store is still held by a training");
         }
+        let Wakings { work, minds, snapshots } = self.wakings();
+        tracing::info!(
+            woken = work.rebuilds,
+            events_folded = work.events_folded,
+            trained_again = work.trainings,
+            not_reproduced = work.not_reproduced,
+            stale_minds = minds.stale,
+            damaged_minds = minds.damaged,
+            stale_snapshots = snapshots.stale,
+            damaged_snapshots = snapshots.damaged,
+            "what waking people has cost"
+        );
     }
 }
 

@@ -26,6 +26,7 @@ pub(super) struct Parts<D: Domain> {
     pub store: Store,
     pub recipe: Recipe,
     pub recipe_text: String,
+    pub minds: Arc<Minds>,
     pub failure: Failure,
     pub open: Awake,
 }
@@ -68,13 +69,13 @@ impl<D: Domain> Life<D> {
         trainer: impl FnOnce(Arc<Life<D>>) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
-        let Parts { domain, store, recipe: _, recipe_text, failure, open } = parts;
+        let Parts { domain, store, recipe: _, recipe_text, minds, failure, open } = parts;
         let life = Arc::new(Life {
             domain,
             store,
             recipe_text,
             base,
-            minds: Arc::default(),
+            minds,
             trainer: OnceLock::new(),
             places: Arc::new(Semaphore::new(TRAIN_QUEUE_MAX)),
             failure,
@@ -199,7 +200,7 @@ pub(super) fn train<D: Domain>(
 ) -> Result<Arc<Mind>, String> {
     let mind =
         learning::train(&*life.domain, recipe, lessons).map_err(|error| error.to_string())?;
-    if let Err(error) = life.store.models.put(stream, mind.digest(), &mind.to_bytes()) {
+    if let Err(error) = replay::keep_mind(&life.store, stream, &mind) {
         // The bytes of a mind are a cache: without them the next waking trains again.
         tracing::warn!(%stream, %error, "the mind's bytes were not kept");
     }

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{audit, converse, eval, log, replay, serve, talk, transcript};
+use super::{audit, converse, eval, log, replay, self_test, serve, talk, transcript};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -50,6 +50,7 @@ enum Verb {
     Log(log::Arguments),
     Replay(replay::Arguments),
     Audit(audit::Arguments),
+    SelfTest(self_test::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit code.
@@ -77,6 +78,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Log(arguments)) => log::run(arguments),
         Some(Verb::Replay(arguments)) => replay::run(arguments),
         Some(Verb::Audit(arguments)) => audit::run(arguments),
+        Some(Verb::SelfTest(arguments)) => self_test::run(arguments),
     }
 }
 

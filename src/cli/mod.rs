@@ -12,6 +12,7 @@ mod logging;
 mod past;
 mod recipe;
 mod replay;
+mod self_test;
 mod serve;
 mod talk;
 mod terminal;

@@ -1,7 +1,7 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Event, EventKind};
+use super::{Event, EventKind, upcast};
 
 /// Why a record's body is no event this binary can read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -32,11 +32,14 @@ pub fn encode(event: &Event) -> Vec<u8> {
     }
 }
 
+/// Reads every version that was ever released.
+///
 /// - errors: [`DecodeError`]; never panics, whatever the bytes.
 pub fn decode(kind: u16, version: u16, body: &[u8]) -> Result<Event, DecodeError> {
     let kind = EventKind::from_number(kind).ok_or(DecodeError::UnknownKind { kind })?;
     if version != kind.version() {
-        return Err(DecodeError::UnknownVersion { kind, version });
+        return upcast::former(kind, version, body)?
+            .ok_or(DecodeError::UnknownVersion { kind, version });
     }
     Ok(match kind {
         EventKind::SessionOpened => Event::SessionOpened(unpack(kind, body)?),
@@ -57,7 +60,7 @@ fn pack<T: Serialize>(body: &T) -> Vec<u8> {
     rmp_serde::to_vec_named(body).expect("events are plain data and encode into memory")
 }
 
-fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Result<T, DecodeError> {
+pub(super) fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Result<T, DecodeError> {
     let wrong = |reason: String| DecodeError::Body { kind, reason };
     // `from_read_ref` would keep showing the whole body, read or not.
     let mut decoder = rmp_serde::Deserializer::new(body);

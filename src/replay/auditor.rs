@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::audit::{Counts, Progress, Scrutiny, StreamReport};
+use super::origins::mind_origin;
 use super::{Difference, repropose};
 use crate::events::{Event, Record, Report, RetrainCompleted};
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
 use crate::session::{Outstanding, Session};
-use crate::store::{ReadError, Store};
+use crate::store::{Found, ReadError, Store};
 use crate::world::Domain;
 
 /// Records between two calls of whoever watches.
@@ -256,6 +257,8 @@ impl<'a, D: Domain> Auditor<'a, D> {
                         recipe: recipe.digest(),
                         mind: mind.digest(),
                         report: Report { exemplars, threshold, figures },
+                        // Other code may have trained it: the question is whether this one agrees.
+                        code: event.code,
                     });
                     if let Some(found) = Difference::of_events(seq, &record.event, &today) {
                         self.counts.trainings_differ += 1;
@@ -307,20 +310,26 @@ impl<'a, D: Domain> Auditor<'a, D> {
     fn find(&mut self, wanted: Digest) -> Trained {
         let (domain, recipe) = (&**self.domain, self.session.recipe().clone());
         let lessons = self.session.trained_lessons();
-        let cached = self.store.models.load(self.stream, wanted);
-        let cached = cached.and_then(|bytes| Mind::from_bytes(domain, &recipe, &bytes).ok());
-        let mind = match cached {
-            Some(mind) => return Ok(Arc::new(mind)),
-            None if lessons.is_empty() => self.bases.get(domain, &recipe)?,
-            None => {
+        let origin = mind_origin(recipe.digest());
+        let read = |bytes: &[u8]| Mind::from_bytes(domain, &recipe, bytes).ok();
+        let kept = match self.store.models.load(self.stream, &origin, wanted, read) {
+            Found::Fits(mind) => return Ok(Arc::new(mind)),
+            // What other code trained answers only when this code cannot train the same.
+            Found::Stale(mind) => Some(mind),
+            Found::Absent | Found::Damaged => None,
+        };
+        let trained = match lessons.is_empty() {
+            true => self.bases.get(domain, &recipe),
+            false => {
                 self.counts.minds_missing += 1;
                 let trained = learning::train(domain, &recipe, &lessons);
-                Arc::new(trained.map_err(|error| error.to_string())?)
+                trained.map(Arc::new).map_err(|error| error.to_string())
             }
         };
-        match mind.digest() == wanted {
-            true => Ok(mind),
-            false => Err(mind.digest().to_string()),
+        match (trained, kept) {
+            (Ok(mind), _) if mind.digest() == wanted => Ok(mind),
+            (_, Some(kept)) => Ok(Arc::new(kept)),
+            (trained, None) => Err(trained?.digest().to_string()),
         }
     }
 

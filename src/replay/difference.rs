@@ -188,6 +188,7 @@ mod tests {
             recipe: Digest::ZERO,
             mind: Digest::of(b"mind"),
             report,
+            code: None,
         })
     }
 

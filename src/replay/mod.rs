@@ -6,11 +6,13 @@ mod audit;
 mod auditor;
 mod difference;
 mod minds;
+mod origins;
 mod rebuild;
 mod repropose;
 
 pub use audit::{AuditReport, Counts, Progress, Scrutiny, StreamReport, audit, streams_of};
 pub use difference::{Difference, body};
-pub use minds::Minds;
+pub use minds::{Minds, Work};
+pub use origins::{keep_mind, mind_origin, state_origin};
 pub use rebuild::{RebuildError, keep_snapshot, mind_of, rebuild, rebuild_at};
 pub use repropose::command_of;

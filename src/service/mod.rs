@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use crate::actors::{ActorsError, Failure, House, HouseSettings};
+use crate::actors::{ActorsError, Failure, House, HouseSettings, Wakings};
 use crate::frontends::{
     Client, ClientError, Context, Counts, Endpoint, EndpointError, Gateway, GatewayError,
 };
@@ -141,6 +141,11 @@ impl Service {
     /// People awake now.
     pub fn awake(&self) -> usize {
         self.house.awake()
+    }
+
+    /// What waking people has cost, and how often a kept mind or snapshot was stale or damaged.
+    pub fn wakings(&self) -> Wakings {
+        self.house.wakings()
     }
 
     /// Why the service cannot go on, if so: it then answers nobody, and whoever started it must

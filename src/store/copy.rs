@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::files::make_dir;
+use super::layout::{Former, LAYOUT, LAYOUT_FILE, Standing, bring_up, standing};
 use super::open::{lock_existing, open_log};
 use super::sled::SledCache;
 use super::{Entropy, Keys, OpenError, OsEntropy, Store};
@@ -32,6 +33,7 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     let target = std::env::temp_dir().join(name);
     let copy = PrivateCopy { dir: target, of: dir.to_owned() };
     let copied = make_dir(&copy.dir)
+        .and_then(|()| fs::copy(dir.join(LAYOUT_FILE), copy.dir.join(LAYOUT_FILE)).map(|_| ()))
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
         .and_then(|()| match dir.join("cache").is_dir() {
             true => copy_tree(&dir.join("cache"), &copy.dir.join("cache")),
@@ -64,7 +66,13 @@ fn check_there(dir: &Path) -> Result<(), OpenError> {
 }
 
 impl PrivateCopy {
-    /// The store of the copy, its cached minds included; new people cannot be added to it.
+    /// Where the copy is.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The store of the copy, its cached minds included; new people cannot be added to it. A copy of
+    /// a former layout is brought up; its original is not.
     ///
     /// Errors name the directory that was copied.
     pub fn open(&self) -> Result<Store, OpenError> {
@@ -78,11 +86,16 @@ impl PrivateCopy {
         let keys = Keys::open_read_only(&self.of.join("keys"), Arc::new(OsEntropy));
         let keys = Arc::new(keys);
         let lock = Arc::new(lock);
+        let from = standing(&self.dir)?;
         let log = open_log(&self.dir, keys.clone(), false, lock.clone());
         let log = log.map_err(|error| self.said_of_the_original(error))?;
         let cache = SledCache::open(&self.dir.join("cache"), lock).map_err(|reason| {
             self.said_of_the_original(OpenError::Database { dir: String::new(), reason })
         })?;
+        if let Standing::At(from @ 1..LAYOUT) = from {
+            let former = Former { dir: &self.dir, log: &log, keys: &keys, cache: &cache };
+            bring_up(&former, from, |_| Ok(()))?;
+        }
         Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
     }
 

@@ -95,6 +95,14 @@ impl EventLog for Drill {
         self.faulty.head(stream)
     }
 
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
+        self.faulty.tenants()
+    }
+
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        self.faulty.walk(stream)
+    }
+
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         self.faulty.streams(tenant)
     }

@@ -5,20 +5,14 @@ use std::sync::Arc;
 
 use super::cache::{Cache, MemoryCache};
 use super::files::{make_dir, sync_dir, write_whole};
+use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
 use super::sled::{LogError, SledCache};
 use super::{
     Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog, SnapshotStore,
 };
 use crate::ids::{StreamId, TenantId};
 
-/// The layout of data directories that this binary makes and reads.
-pub const LAYOUT: u32 = 1;
-
-const LAYOUT_FILE: &str = "LAYOUT";
-const LAYOUT_TEXT: &str = "apprentice data directory, layout ";
-const LOCK_FILE: &str = "LOCK";
-/// Stands while a directory is being made; nothing was acknowledged yet.
-const CREATING_FILE: &str = "CREATING";
+pub(super) const LOCK_FILE: &str = "LOCK";
 
 /// Everything durable that a service needs.
 #[derive(Clone)]
@@ -50,8 +44,8 @@ pub enum OpenError {
     )]
     Absent { dir: String, found: &'static str },
     #[error(
-        "the data directory {dir} has layout {found}, this version of apprentice knows {LAYOUT}; \
-         use a newer version"
+        "the data directory {dir} has layout {found}, this version of apprentice knows layouts up \
+         to {LAYOUT}; use the version that wrote it or a newer one, or the backup made before that"
     )]
     Newer { dir: String, found: u32 },
     #[error("the file LAYOUT of the data directory {dir} is damaged; restore it from a backup")]
@@ -78,13 +72,14 @@ fn list(damage: &[Damage]) -> String {
     shown.join("; ")
 }
 
-/// Opens the data directory `dir`, and makes it if it does not exist or is empty. One process may
-/// have it open at a time.
+/// Opens the data directory `dir`, and makes it if it does not exist or is empty; one of a former
+/// layout is brought up. One process may have it open at a time.
 pub fn open(dir: &Path) -> Result<Store, OpenError> {
     let fail = Fail(dir);
     make_dir(dir).map_err(|error| fail.io(dir, &error))?;
     let lock = Arc::new(take_lock(dir)?);
-    let fresh = is_fresh(dir)?;
+    let standing = standing(dir)?;
+    let fresh = standing == Standing::Fresh;
     if fresh {
         write_durably(&dir.join(CREATING_FILE), "").map_err(|e| fail.io(dir, &e))?;
     }
@@ -102,12 +97,19 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
         .map_err(|e| fail.key(e))?;
     let cache =
         SledCache::open(&dir.join("cache"), lock).map_err(|reason| fail.database(reason))?;
-    if fresh {
-        let layout = dir.join(LAYOUT_FILE);
-        write_durably(&layout, &format!("{LAYOUT_TEXT}{LAYOUT}\n"))
-            .and_then(|()| fs::remove_file(dir.join(CREATING_FILE)))
-            .and_then(|()| sync_dir(dir))
-            .map_err(|error| fail.io(&layout, &error))?;
+    match standing {
+        Standing::Fresh => {
+            write_layout(dir, LAYOUT)?;
+            let creating = dir.join(CREATING_FILE);
+            fs::remove_file(&creating)
+                .and_then(|()| sync_dir(dir))
+                .map_err(|error| fail.io(&creating, &error))?;
+        }
+        Standing::At(LAYOUT) => layout::clear_former(&cache),
+        Standing::At(from) => {
+            let former = Former { dir, log: &log, keys: &keys, cache: &cache };
+            layout::bring_up(&former, from, |_| Ok(()))?;
+        }
     }
     Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
 }
@@ -181,47 +183,12 @@ pub(super) fn lock_existing(dir: &Path) -> Result<File, OpenError> {
     let path = dir.join(LOCK_FILE);
     let file = File::open(&path).map_err(|error| Fail(dir).io(&path, &error))?;
     let file = lock(dir, file)?;
-    match is_fresh(dir)? {
-        false => Ok(file),
-        true => {
+    match standing(dir)? {
+        Standing::At(_) => Ok(file),
+        Standing::Fresh => {
             let found = "nothing that was ever used".to_owned();
             Err(OpenError::NotOurs { dir: Fail(dir).dir(), found })
         }
-    }
-}
-
-/// Whether the directory is still to be made.
-///
-/// - errors: it belongs to somebody else, or to a newer version.
-fn is_fresh(dir: &Path) -> Result<bool, OpenError> {
-    let fail = Fail(dir);
-    if dir.join(CREATING_FILE).exists() {
-        return Ok(true);
-    }
-    let path = dir.join(LAYOUT_FILE);
-    match fs::read(&path) {
-        Ok(bytes) => {
-            let text = std::str::from_utf8(&bytes).ok().and_then(|text| text.strip_suffix('\n'));
-            let number = text.and_then(|text| text.strip_prefix(LAYOUT_TEXT)?.parse().ok());
-            match number {
-                Some(LAYOUT) => Ok(false),
-                Some(found) if found > LAYOUT => Err(OpenError::Newer { dir: fail.dir(), found }),
-                _ => Err(OpenError::Layout { dir: fail.dir() }),
-            }
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            let entries = fs::read_dir(dir).map_err(|error| fail.io(dir, &error))?;
-            for entry in entries {
-                let name = entry.map_err(|error| fail.io(dir, &error))?.file_name();
-                // A crash right at the start leaves these two.
-                if name != LOCK_FILE && name != "CREATING.new" {
-                    let found = format!("{:?}", name.to_string_lossy());
-                    return Err(OpenError::NotOurs { dir: fail.dir(), found });
-                }
-            }
-            Ok(true)
-        }
-        Err(error) => Err(fail.io(&path, &error)),
     }
 }
 
@@ -281,7 +248,7 @@ mod tests {
             open(&dir).unwrap();
         }
         let layout = fs::read_to_string(dir.join("LAYOUT")).unwrap();
-        assert_eq!(layout, "apprentice data directory, layout 1\n");
+        assert_eq!(layout, "apprentice data directory, layout 2\n");
         assert!(!dir.join("CREATING").exists());
         assert!(dir.join("keys/local.key").exists());
     }
@@ -324,7 +291,7 @@ mod tests {
     fn a_layout_that_is_newer_or_damaged_is_refused() {
         let (dir, _) = used();
         for (text, part) in [
-            ("apprentice data directory, layout 2\n", "use a newer version"),
+            ("apprentice data directory, layout 3\n", "the version that wrote it or a newer one"),
             ("apprentice data directory, layout 1", "is damaged"),
             ("apprentice data directory, layout 0\n", "is damaged"),
             ("\u{0}", "is damaged"),

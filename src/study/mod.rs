@@ -11,6 +11,7 @@ mod episode;
 pub mod failures;
 pub mod figures;
 pub mod goals;
+pub mod known_minds;
 pub mod lessons;
 pub mod one_shot;
 pub mod parallel;
