@@ -1,5 +1,8 @@
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use std::io::ErrorKind;
+
+use rmp_serde::decode::Error;
+use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::{Deserialize, Serialize};
 
 use super::{Event, EventKind, upcast};
 
@@ -62,13 +65,16 @@ fn pack<T: Serialize>(body: &T) -> Vec<u8> {
 
 pub(super) fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Result<T, DecodeError> {
     let wrong = |reason: String| DecodeError::Body { kind, reason };
-    // `from_read_ref` would keep showing the whole body, read or not.
-    let mut decoder = rmp_serde::Deserializer::new(body);
+    // Of a slice, not of a reader: that copies every text twice.
+    let mut decoder = rmp_serde::Deserializer::from_read_ref(body);
     // A scene file of nested tables must not overflow the stack of whoever reads it.
     decoder.set_max_depth(64);
     let event = T::deserialize(&mut decoder).map_err(|error| wrong(error.to_string()))?;
-    match decoder.get_ref().is_empty() {
-        true => Ok(event),
-        false => Err(wrong("bytes follow after its end".to_owned())),
+    // A slice's decoder does not show what is left; at the end there is no next value to read.
+    match IgnoredAny::deserialize(&mut decoder) {
+        Err(Error::InvalidMarkerRead(error)) if error.kind() == ErrorKind::UnexpectedEof => {
+            Ok(event)
+        }
+        _ => Err(wrong("bytes follow after its end".to_owned())),
     }
 }

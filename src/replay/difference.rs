@@ -199,7 +199,7 @@ mod tests {
         let found = Difference::of_events(3, &completed(0.5), &completed(next)).unwrap();
         assert_eq!(
             found.to_string(),
-            "record 3: report.threshold: recorded 0.5, recomputed 0.50000006"
+            "record 3: report.threshold: recorded 0.5, recomputed 0.5000000596046448"
         );
         let zero = Difference::of_events(3, &completed(0.0), &completed(-0.0)).unwrap();
         assert_eq!(zero.field, "report.threshold");

@@ -57,7 +57,10 @@ fn check_there(dir: &Path) -> Result<(), OpenError> {
     let absent = |found| Err(OpenError::Absent { dir: dir.display().to_string(), found });
     match fs::read_dir(dir).map(|mut entries| entries.next().is_none()) {
         Ok(true) => absent("the directory is empty"),
-        Ok(false) if !dir.join("LOCK").exists() => absent("it holds other files"),
+        // A log without its other files is one to be restored, which locking says.
+        Ok(false) if !["LAYOUT", "CREATING", "log"].iter().any(|name| dir.join(name).exists()) => {
+            absent("it holds other files")
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => absent("nothing has that name"),
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => absent("it is a file"),
         // What else is wrong shows when it is locked.

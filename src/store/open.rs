@@ -77,6 +77,8 @@ fn list(damage: &[Damage]) -> String {
 pub fn open(dir: &Path) -> Result<Store, OpenError> {
     let fail = Fail(dir);
     make_dir(dir).map_err(|error| fail.io(dir, &error))?;
+    // Before anything is written: what belongs to somebody else is left as it is.
+    standing(dir)?;
     let lock = Arc::new(take_lock(dir)?);
     let standing = standing(dir)?;
     let fresh = standing == Standing::Fresh;
