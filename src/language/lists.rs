@@ -31,6 +31,23 @@ pub struct WordLists {
     /// Verbs of moving that need no goal: "turn around".
     pub moving: BTreeSet<String>,
     pub verbs: BTreeSet<String>,
+    /// Before a verb: what follows is what the rest is for ("to chill").
+    pub purposes: BTreeSet<String>,
+    /// How long, how often, until when: no single step takes a time.
+    pub lasting: BTreeSet<String>,
+    /// Before a mention: where a way ends ("take the mug TO the sink"), and where it begins.
+    pub destination: BTreeSet<String>,
+    pub leaving: BTreeSet<String>,
+    /// What follows says where a place is, not which: "where the lamp is".
+    pub wherever: BTreeSet<String>,
+    /// Before a place that something is put on, and particles that may stand between a verb and its
+    /// object.
+    pub onto: BTreeSet<String>,
+    pub passed: BTreeSet<String>,
+    /// Words, determiners aside, that make the mention behind them a landmark: "next to".
+    pub landmarks: BTreeSet<String>,
+    /// After a noun that is a verb too: it is a verb ("clean up").
+    pub carrying_on: BTreeSet<String>,
 }
 
 impl WordLists {

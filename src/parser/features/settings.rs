@@ -13,6 +13,9 @@ pub struct FeaturesSettings {
     pub lesson_max: f32,
     /// From this probability on a lesson decides, whatever its words mean as primitives.
     pub lesson_decides: f32,
+    /// Added to every primitive's logit for each word that says more than one primitive does
+    /// ("to chill it", "for a minute"). Not learned: recorded primitives hardly have such words.
+    pub unread: f32,
     pub primitive: PrimitiveWeights,
     pub lesson: LessonSettings,
 }
@@ -91,6 +94,10 @@ impl FeaturesSettings {
                     format!("{field} is {value}; expected a probability between {min} and 0.99");
                 return Err((field, reason));
             }
+        }
+        if !(-50.0..=0.0).contains(&self.unread) {
+            let reason = format!("unread is {}; expected between -50 and 0", self.unread);
+            return Err(("unread", reason));
         }
         Ok(())
     }
