@@ -87,6 +87,9 @@ impl Front {
 
 /// How long a stop waits for actors to fall asleep, and then for trainings to end.
 const FALL_ASLEEP: Duration = Duration::from_secs(30);
+/// The same when the service has failed: it must be seen to be gone, and nothing that it could
+/// still do in order would be kept.
+const FALL_DOWN: Duration = Duration::from_millis(200);
 
 impl House {
     /// Trains the base mind, so that nobody ever waits for it, and starts the actors.
@@ -164,15 +167,16 @@ impl House {
     pub fn stop(&mut self) {
         let Some(thread) = self.thread.take() else { return };
         self.failure.stop_expected();
+        let patience = if self.failure.reason().is_some() { FALL_DOWN } else { FALL_ASLEEP };
         self.directory.do_send(SleepAll);
-        if !self.awake.wait_for_silence(FALL_ASLEEP) {
+        if !self.awake.wait_for_silence(patience) {
             tracing::warn!(awake = self.awake.now(), "stopping although not everybody sleeps");
         }
         self.system.stop();
         // A panic in there was reported by its alarm.
         let _ = thread.join();
         // A training that still runs holds the store; whoever opens it next must not find it busy.
-        if !self.lives.wait_for_silence(FALL_ASLEEP) {
+        if !self.lives.wait_for_silence(patience) {
             tracing::warn!("the store is still held by a training");
         }
         let Wakings { work, minds, snapshots } = self.wakings();

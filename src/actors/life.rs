@@ -16,6 +16,7 @@ use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
+use crate::sabotage;
 use crate::session::{Command, Proposed, Session};
 use crate::store::{AppendError, EventLog, Store};
 use crate::world::Domain;
@@ -198,6 +199,7 @@ pub(super) fn train<D: Domain>(
     recipe: &Recipe,
     lessons: &[Lesson<D::Scene, D::Task>],
 ) -> Result<Arc<Mind>, String> {
+    sabotage::point("training");
     let mind =
         learning::train(&*life.domain, recipe, lessons).map_err(|error| error.to_string())?;
     if let Err(error) = replay::keep_mind(&life.store, stream, &mind) {

@@ -105,6 +105,13 @@ pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
     run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", package])
 }
 
+/// What makes and mounts a file system in a file.
+pub fn disk_tools() -> Result<(), String> {
+    debian("e2fsprogs", || answers("mkfs.ext4", &["-V"]))?;
+    debian("mount", || answers("losetup", &["--version"]))?;
+    debian("util-linux", || answers("unshare", &["--version"]))
+}
+
 /// Installs the licence checker unless it is there.
 pub fn cargo_deny() -> Result<(), String> {
     if answers("cargo", &["deny", "--version"]) {
