@@ -33,6 +33,8 @@ pub struct Counts {
     pub failed: usize,
     pub at_start: usize,
     pub under_way: usize,
+    /// Of those, the log hung and the watch ended it.
+    pub hung: usize,
     /// One person got an honest error, everybody else would have gone on.
     pub refused: usize,
     /// The call belonged to a cache, or was made again with success: nobody noticed.
@@ -68,7 +70,7 @@ fn shim() -> &'static Path {
     })
 }
 
-fn environment(folder: &Path, kind: &str, at: usize) -> Vec<(&'static str, String)> {
+pub fn environment(folder: &Path, kind: &str, at: usize) -> Vec<(&'static str, String)> {
     vec![
         ("LD_PRELOAD", shim().display().to_string()),
         ("FAULT_DIR", folder.join("data").display().to_string()),
@@ -162,6 +164,8 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
     let mut counts = counts.lock().unwrap();
     counts.failed += usize::from(what.is_some());
     counts.not_reached += usize::from(what.is_none());
+    let hung = |ended: &Ended| ended.errors.contains("has not taken a record within");
+    counts.hung += usize::from(matches!(&ending, Ending::Gone(ended) if hung(ended)));
     match ending {
         Ending::Gone(_) if promised.is_empty() => counts.at_start += 1,
         Ending::Gone(_) => counts.under_way += 1,

@@ -3,6 +3,7 @@
 //! would not be on the disk.
 
 use std::collections::BTreeSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::Ordering;
@@ -14,6 +15,7 @@ use apprentice::store::{self, OpenError};
 
 use crate::crash::wait_while;
 use crate::dice::Dice;
+use crate::disk;
 use crate::ledger::Ledger;
 use crate::people::{Person, Signals};
 use crate::served::{PATIENCE, Server};
@@ -119,7 +121,7 @@ pub fn cut(images: usize, seed: u64) -> Counts {
     let (mut dice, mut counts) = (Dice::new(seed), Counts::default());
     while counts.images < images {
         let wanted = IMAGES_OF_ONE.min(images - counts.images);
-        one_disk(wanted, &mut dice, &mut counts);
+        one_disk(wanted, Syncs::Honest, &mut dice, &mut counts);
         if counts.images % 50 == 0 {
             eprintln!("{} images: {counts:?}", counts.images);
         }
@@ -127,7 +129,29 @@ pub fn cut(images: usize, seed: u64) -> Counts {
     counts
 }
 
-fn one_disk(images: usize, dice: &mut Dice, counts: &mut Counts) {
+/// Cuts the power of a service whose syncs do nothing.
+///
+/// - returns: the first broken promise that was seen, if one was among so many images.
+pub fn cut_without_syncs(images: usize, seed: u64) -> Option<String> {
+    let (mut dice, mut counts) = (Dice::new(seed), Counts::default());
+    while counts.images < images {
+        let one = || one_disk(IMAGES_OF_ONE, Syncs::Lie, &mut dice, &mut counts);
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(one)) {
+            let text = panic.downcast_ref::<String>().cloned();
+            return Some(text.unwrap_or_else(|| "a panic without words".to_owned()));
+        }
+    }
+    None
+}
+
+/// Whether `fsync` and `fdatasync` of the service do what they say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Syncs {
+    Honest,
+    Lie,
+}
+
+fn one_disk(images: usize, syncs: Syncs, dice: &mut Dice, counts: &mut Counts) {
     // In memory where there is such a place: what counts is what reached the image file, and not
     // what that costs.
     let memory = Path::new("/dev/shm");
@@ -140,13 +164,17 @@ fn one_disk(images: usize, dice: &mut Dice, counts: &mut Counts) {
     Disk::make(&image);
     // `writeback` lets a file grow before its bytes are there, which other file systems do too.
     let options = *dice.of(&["data=ordered", "data=ordered", "data=writeback"]);
-    let disk = Disk::mount(&image, &folder.path().join("mounted"), options);
+    let mounted = Disk::mount(&image, &folder.path().join("mounted"), options);
     let socket = folder.path().join("socket");
     let ledgers: Vec<Ledger> =
         (0..PEOPLE).map(|number| Ledger::new(&format!("person {number}"))).collect();
     let seeds: Vec<u64> = ledgers.iter().map(|_| dice.next()).collect();
     let signals = Signals::default();
-    let mut server = Server::spawn(&disk.data(), &socket, &[]);
+    let environment = match syncs {
+        Syncs::Honest => Vec::new(),
+        Syncs::Lie => disk::environment(&mounted.at, "lie", 0),
+    };
+    let mut server = Server::spawn(&mounted.data(), &socket, &environment);
     thread::scope(|scope| {
         let _hang_up = HangUp(&signals);
         for (ledger, seed) in ledgers.iter().zip(&seeds) {

@@ -3,7 +3,7 @@
  *
  * FAULT_DIR  the directory
  * FAULT_KIND full (writes, ENOSPC, from the N-th on), write (one write, EIO), sync (one sync, EIO),
- *            count (nothing fails)
+ *            lie (fsync and fdatasync succeed and do nothing), count (nothing fails)
  * FAULT_AT   N, counted from 1
  * FAULT_MARK a file outside the directory: the path of the file whose call failed first; with
  *            `count`, at the end, the numbers of writes and syncs
@@ -22,7 +22,7 @@
 #include <unistd.h>
 
 static const char *dir, *mark;
-static enum { NONE, FULL, WRITE, SYNC, COUNT } kind;
+static enum { NONE, FULL, WRITE, SYNC, LIE, COUNT } kind;
 static long at;
 static atomic_long writes, syncs;
 
@@ -33,7 +33,7 @@ __attribute__((constructor)) static void begin(void) {
     at = number ? atol(number) : 0;
     if (!dir || !mark || !word) return;
     kind = !strcmp(word, "full") ? FULL : !strcmp(word, "write") ? WRITE
-         : !strcmp(word, "sync") ? SYNC : !strcmp(word, "count") ? COUNT : NONE;
+         : !strcmp(word, "sync") ? SYNC : !strcmp(word, "lie") ? LIE : !strcmp(word, "count") ? COUNT : NONE;
 }
 
 /* The path of the file, if it lies below the directory. */
@@ -65,9 +65,14 @@ static int fails(int fd, int is_sync) {
         say(text);
         return 0;
     }
-    if (is_sync != (kind == SYNC) || (kind == FULL ? number < at : number != at)) return 0;
+    if (kind == LIE || is_sync != (kind == SYNC) || (kind == FULL ? number < at : number != at)) return 0;
     if (number == at) say(path);
     return kind == FULL ? ENOSPC : EIO;
+}
+
+static int lies(int fd) {
+    char path[4096];
+    return kind == LIE && ours(fd, path, sizeof path);
 }
 
 #define REAL(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
@@ -104,10 +109,12 @@ int ftruncate64(int fd, off64_t size) {
 }
 int fsync(int fd) {
     GUARD(fd, 1);
+    if (lies(fd)) return 0;
     return REAL(fsync)(fd);
 }
 int fdatasync(int fd) {
     GUARD(fd, 1);
+    if (lies(fd)) return 0;
     return REAL(fdatasync)(fd);
 }
 int sync_file_range(int fd, off64_t from, off64_t size, unsigned int flags) {
