@@ -12,7 +12,7 @@ use apprentice::study::goals::goals;
 use apprentice::study::one_shot::one_shot;
 use apprentice::study::people::People;
 use apprentice::study::primitives::primitives;
-use apprentice::study::report::Setting;
+use apprentice::study::report::{Setting, Teachers};
 use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
@@ -233,9 +233,40 @@ fn more_lessons_are_taught_when_asked_for() {
     let arguments = ["--protocol", "one-shot", "--seed", "1", "--limit", "3", "--lessons"];
     let of = |count: &str| eval_json(corpus.path(), &[&arguments[..], &[count]].concat());
     assert_eq!((number(&of("1"), "lessons"), number(&of("2"), "lessons")), (1.0, 2.0));
+    // Where both people teach, nobody else is left to be asked.
+    let several =
+        eval_json(corpus.path(), &[&arguments[..], &["2", "--teachers", "several"]].concat());
+    assert_eq!((&several["lessons"], &several["teachers"]), (&json!(2), &json!("several")));
+    assert_eq!((&several["others"]["n"], &several["same_person"]["n"]), (&json!(0), &json!(3)));
+    assert_eq!(of("2")["others"]["n"], 3);
     // Nobody in this corpus has a hundred sentences.
     let output = eval(corpus.path(), &[&arguments[..], &["51"]].concat());
     assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn a_promise_stands_beside_what_was_kept() {
+    let report = eval_json(file(&lines(&own_steps())).path(), &["--protocol", "primitives"]);
+    let promise = &report["promise"];
+    // The paper's threshold is set so that nine of ten answers in its calibration are right.
+    assert_eq!(number(promise, "promised"), 0.9);
+    assert_eq!(number(promise, "achieved"), number(&report, "precision"));
+    assert_eq!(number(&promise["by_person"], "n"), 2.0, "{promise:#}");
+    let bands = promise["bands"].as_array().unwrap();
+    let carried_out: f64 = bands.iter().map(|band| number(band, "n")).sum();
+    assert_eq!(carried_out, (number(&report, "coverage") * number(&report, "n")).round());
+}
+
+#[test]
+fn cases_are_listed_without_anybodys_sentence() {
+    let corpus = file(&lines(&own_steps()));
+    let output = eval(corpus.path(), &["--protocol", "primitives", "--seed", "1", "--cases", "2"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let cases = text.split("Cases: ").nth(1).expect("pondering is not understood");
+    assert!(cases.contains("| row | meant | got | why | nearest |"), "{cases}");
+    assert!(!text.contains("ponder"), "{text}");
+    let refused = eval(corpus.path(), &["--protocol", "primitives", "--cases", "2", "--json"]);
+    assert_eq!(refused.status.code(), Some(2));
 }
 
 #[test]
@@ -246,7 +277,7 @@ fn an_ablation_shows_what_each_difference_brings() {
     let path = list.path().to_str().unwrap();
     let report = eval_json(corpus.path(), &["--seed", "1", "--ablation", path]);
     let lines = report["lines"].as_array().unwrap();
-    assert_eq!((lines.len(), &lines[1]["without"]), (2, &Value::from("approach")));
+    assert_eq!((lines.len(), &lines[1]["difference"]), (2, &Value::from("approach")));
     assert_ne!(lines[0]["recipe_digest"], lines[1]["recipe_digest"]);
     for key in ["right", "wrong", "untaught_accepted", "others", "distractors_accepted"] {
         let mean = |line: usize, what: &str| number(&lines[line][what][key], "mean");
@@ -351,7 +382,9 @@ fn slice(recipe: &str, steps: &Path, whole: &Path) -> Slice {
         people: People::Choosing,
         threads: 2,
         progress: &(),
+        teachers: Teachers::One,
         failures: 0,
+        cases: 0,
     };
     let (steps, whole) = (read(steps), read(whole));
     let primitives = primitives(&setting(ROWS), &steps.steps).unwrap();

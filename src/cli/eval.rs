@@ -15,7 +15,7 @@ use crate::study::one_shot::one_shot;
 use crate::study::parallel::Progress;
 use crate::study::people::People;
 use crate::study::primitives::primitives;
-use crate::study::report::Setting;
+use crate::study::report::{Setting, Teachers};
 
 /// Bad lines shown; all are counted.
 const BAD_LINES_SHOWN: usize = 5;
@@ -31,8 +31,10 @@ Examples:
   apprentice eval --corpus utterances.jsonl.gz --protocol primitives
   apprentice eval --corpus utterances.jsonl.gz --protocol one-shot --recipe paper --limit 6
   apprentice eval --corpus goals.jsonl.gz --protocol goals --seed 1 --json
-  apprentice eval --corpus utterances.jsonl.gz --protocol one-shot --lessons 3
+  apprentice eval --corpus utterances.jsonl.gz --protocol one-shot --lessons 3 --teachers several
+  apprentice eval --corpus utterances.jsonl.gz --protocol primitives --cases 10
   apprentice eval --corpus utterances.jsonl.gz --ablation tools/ablation.toml --people choosing
+  apprentice eval --corpus utterances.jsonl.gz --ablation tools/additions.toml --recipe paper
 
 docs/evaluation.md describes the corpus, the protocols and every figure.
 
@@ -45,9 +47,9 @@ pub struct Arguments {
     /// What is measured.
     #[arg(long, value_enum, required_unless_present = "ablation")]
     protocol: Option<Protocol>,
-    /// Instead: take back one difference of the recipe at a time, as this file lists them, and show
-    /// what primitives and one-shot lose by it. --limit counts rows; episodes are 24 a seed.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["protocol", "failures", "lessons"])]
+    /// Instead: take back, or add, one difference of the recipe at a time, as this file lists them,
+    /// and show what primitives and one-shot gain by it. --limit counts rows; episodes are 24 a seed.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["protocol", "failures", "cases", "lessons", "teachers"])]
     ablation: Option<PathBuf>,
     /// The recipe that minds are trained with: default, paper, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
@@ -58,16 +60,23 @@ pub struct Arguments {
     /// Rows of each seed, or episodes for one-shot and goals; all rows, or 24 episodes, without it.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=LIMIT_MAX))]
     limit: Option<u64>,
-    /// Sentences of one person that an episode of one-shot or goals teaches.
+    /// Sentences that an episode of one-shot or goals teaches.
     #[arg(long, value_name = "COUNT", default_value_t = 1,
         value_parser = clap::value_parser!(u64).range(1..=50))]
     lessons: u64,
+    /// Whose sentences these are: all of one person, or each of another.
+    #[arg(long, value_name = "one|several", default_value = "one")]
+    teachers: Teachers,
     /// Whose sentences: a fixed two thirds to choose settings on, the held-out rest, or all.
     #[arg(long, value_name = "choosing|held-out|all", default_value = "all")]
     people: People,
     /// Also show so many failures of each kind (not with --json).
     #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
     failures: usize,
+    /// Also list so many failures of each verdict, drawn whatever the reason, as Markdown without
+    /// the recorded sentences (not with --json).
+    #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
+    cases: usize,
     /// Stop at the first bad line of the corpus.
     #[arg(long)]
     strict: bool,
@@ -112,10 +121,12 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         threads: arguments.threads as usize,
         progress: &bar,
         lessons: arguments.lessons as usize,
+        teachers: arguments.teachers,
         failures: arguments.failures,
+        cases: arguments.cases,
     };
     let report = match (arguments.protocol, variants) {
-        (_, Some(variants)) => ablate(&setting, &corpus, &variants)
+        (_, Some((variants, adds))) => ablate(&setting, &corpus, &variants, adds)
             .map(|report| printed(&report, &arguments, bad_lines)),
         (Some(Protocol::Primitives), None) => primitives(&setting, &corpus.steps)
             .map(|report| printed(&report, &arguments, bad_lines)),
@@ -135,13 +146,14 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     })
 }
 
-/// The recipes that an ablation compares.
-fn variants(path: &Path, recipe: &str) -> Result<Vec<Variant>, Failure> {
+/// The recipes that an ablation compares, and whether they add to the first.
+fn variants(path: &Path, recipe: &str) -> Result<(Vec<Variant>, bool), Failure> {
     let fail = |reason: String| {
         Failure::bad_input(format!("the ablation {} cannot be used: {reason}", path.display()))
     };
     let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
-    Ablation::parse(&text).and_then(|ablation| ablation.variants(recipe)).map_err(fail)
+    let ablation = Ablation::parse(&text).map_err(fail)?;
+    Ok((ablation.variants(recipe).map_err(fail)?, ablation.adds()))
 }
 
 /// A report with what reading the corpus found.

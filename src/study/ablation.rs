@@ -1,5 +1,5 @@
-//! What each difference between two recipes brings: one is taken back at a time, and everything is
-//! measured again.
+//! What each difference between two recipes brings: one is taken back, or added, at a time, and
+//! everything is measured again.
 
 use std::fmt::{self, Display};
 
@@ -12,10 +12,13 @@ use super::primitives::primitives;
 use super::report::Setting;
 use crate::learning::{Recipe, TrainError};
 
-/// Differences to take back, one at a time (TOML; `docs/evaluation.md` has an example).
+/// Differences to take back, or to add, one at a time (TOML; `docs/evaluation.md` has an example).
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ablation {
+    /// Whether a difference adds to the recipe, and so the variant is the one that has it.
+    #[serde(default)]
+    adds: bool,
     #[serde(rename = "difference")]
     differences: Vec<Difference>,
 }
@@ -36,6 +39,10 @@ pub struct Variant {
 }
 
 impl Ablation {
+    pub fn adds(&self) -> bool {
+        self.adds
+    }
+
     /// - errors: a sentence, for text that is no such list.
     pub fn parse(text: &str) -> Result<Ablation, String> {
         toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())
@@ -117,11 +124,11 @@ impl<T: Copy> Figures<T> {
 /// One variant beside the recipe with everything.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    pub without: String,
+    pub difference: String,
     pub recipe_digest: String,
     /// Over seeds.
     pub figures: Figures<Spread>,
-    /// What the difference brings: the whole recipe less this variant, seed by seed.
+    /// What the difference brings: the figure with it less the one without it, seed by seed.
     pub gain: Figures<Spread>,
     /// A training failed, and why: no figures then.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -132,6 +139,7 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AblationReport {
     pub recipe: String,
+    pub adds: bool,
     pub people: String,
     pub seeds: Vec<u64>,
     pub lines: Vec<Line>,
@@ -139,11 +147,13 @@ pub struct AblationReport {
 
 /// Runs *primitives* and *one-shot* for every variant, each seed by itself.
 ///
+/// - `adds`: see [`Ablation::adds`].
 /// - errors: a training of the whole recipe fails. One of a variant is a line that says so.
 pub fn ablate(
     setting: &Setting<'_>,
     corpus: &Corpus,
     variants: &[Variant],
+    adds: bool,
 ) -> Result<AblationReport, TrainError> {
     let mut lines = Vec::new();
     let mut whole: Vec<[f64; 7]> = Vec::new();
@@ -169,15 +179,20 @@ pub fn ablate(
             }))
         };
         lines.push(Line {
-            without: name.clone(),
+            difference: name.clone(),
             recipe_digest: recipe.digest().short(),
             figures: over(&|seed, figure| measured[seed][figure]),
-            gain: over(&|seed, figure| whole[seed][figure] - measured[seed][figure]),
+            gain: over(&|seed, figure| {
+                let lost = whole[seed][figure] - measured[seed][figure];
+                // Not the negative of 0, which is shown as a loss.
+                if adds { 0.0 - lost } else { lost }
+            }),
             failed,
         });
     }
     Ok(AblationReport {
         recipe: setting.recipe.name().to_owned(),
+        adds,
         people: setting.people.to_string(),
         seeds: setting.seeds.to_vec(),
         lines,
@@ -216,10 +231,11 @@ impl Display for AblationReport {
             self.people,
             seeds.join(", ")
         )?;
-        writeln!(f, "| without | {} |", Figures::<f64>::NAMES.join(" | "))?;
+        let head = if self.adds { "with" } else { "without" };
+        writeln!(f, "| {head} | {} |", Figures::<f64>::NAMES.join(" | "))?;
         writeln!(f, "|---|{}", "---|".repeat(Figures::<f64>::NAMES.len()))?;
         for (number, line) in self.lines.iter().enumerate() {
-            write!(f, "| {} |", line.without)?;
+            write!(f, "| {} |", line.difference)?;
             if let Some(reason) = &line.failed {
                 writeln!(f, " training fails: {reason} |")?;
                 continue;
@@ -266,6 +282,27 @@ mod tests {
         assert!(settings(2).abstraction.spelling && !settings(2).lifting.held);
         let whole = Recipe::parse(Recipe::builtin("default").unwrap()).unwrap();
         assert_eq!(found[0].recipe.digest(), whole.digest());
+    }
+
+    #[test]
+    fn a_list_says_whether_it_adds() {
+        let list = "[[difference]]\nname = \"x\"\nset.lifting.held = true\n";
+        assert!(!Ablation::parse(list).unwrap().adds());
+        assert!(Ablation::parse(&format!("adds = true\n{list}")).unwrap().adds());
+    }
+
+    #[test]
+    fn the_lists_that_ship_fit_the_recipes_that_ship() {
+        let lists = [
+            ("default", include_str!("../../tools/ablation.toml"), false),
+            ("paper", include_str!("../../tools/additions.toml"), true),
+        ];
+        for (recipe, list, adds) in lists {
+            let list = Ablation::parse(list).unwrap();
+            assert_eq!(list.adds(), adds);
+            let variants = list.variants(Recipe::builtin(recipe).unwrap()).unwrap();
+            assert!(variants.len() > 8, "{recipe}");
+        }
     }
 
     #[test]

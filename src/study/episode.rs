@@ -9,6 +9,7 @@ use super::failures::{Explain, Failure};
 use super::figures::share;
 use super::primitives::answer;
 use super::renaming::{plain_names, rename, replace};
+use super::report::Teachers;
 use super::scenes::{Clashes, Stages};
 use super::score::{self, Verdict};
 use crate::language::{Answer, Program, Symbol, tokens};
@@ -41,8 +42,9 @@ pub(super) struct Tests<'a> {
     pub groups: &'a [(&'a str, Vec<&'a Row>)],
     pub primitives: &'a [&'a Row],
     pub seed: u64,
-    /// Sentences of the teacher that are taught.
+    /// Sentences that are taught.
     pub lessons: usize,
+    pub teachers: Teachers,
 }
 
 /// What one episode found.
@@ -68,6 +70,18 @@ impl Episode {
         ("distractors", |episode| &episode.distractors),
         ("primitives", |episode| &episode.primitives),
     ];
+
+    /// The share of right answers among all that were carried out as the lesson; none when nothing
+    /// was.
+    pub fn lesson_precision(&self) -> Option<f64> {
+        let asked = [&self.same_person, &self.others, &self.distractors, &self.primitives];
+        let judged = asked.iter().flat_map(|asked| &asked.0);
+        let done =
+            |one: &&Judged| one.accepted && matches!(one.verdict, Verdict::Right | Verdict::Wrong);
+        let done: Vec<&Judged> = judged.filter(done).collect();
+        let right = done.iter().filter(|one| one.verdict == Verdict::Right).count();
+        (!done.is_empty()).then(|| share(right, done.len()))
+    }
 }
 
 /// The sentences of one figure, judged.
@@ -126,6 +140,8 @@ pub(super) fn run<'a>(tests: &Tests<'a>, number: usize) -> Option<Episode> {
         draw::some(&mut draw::rng(tests.seed, &[what, &number_text]), &rows, count)
     };
     let (own, others): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|r| r.user == row.user);
+    let teaches = |user: &str| taught.iter().any(|(row, _)| row.user == user);
+    let others = others.into_iter().filter(|other| !teaches(&other.user)).collect();
     let own = own.into_iter().filter(|other| taught.iter().all(|(row, _)| other.id != row.id));
     let own = own.collect();
     let same_person = draw("same person", own, SAME_PERSON);
@@ -161,9 +177,9 @@ fn lesson(row: &Row, scene: Scene) -> Lesson<Scene, Task> {
     }
 }
 
-/// The wanted number of sentences of one person who has another for the same; people are equally
-/// likely, whether they wrote much or little. The first does not depend on how many are wanted, as
-/// long as its person has enough.
+/// The wanted number of sentences. The first is of a person who has another for the same; people
+/// are equally likely, whether they wrote much or little. It does not depend on how many are
+/// wanted, as long as its person has enough. The others are of the same person, or each of another.
 fn choose_lessons<'a>(
     tests: &Tests<'_>,
     number: usize,
@@ -173,21 +189,29 @@ fn choose_lessons<'a>(
     let mut rng = draw::rng(tests.seed, &["lesson", &number.to_string()]);
     let count = |user: &str| rows.iter().filter(|row| row.user == user).count();
     let users: BTreeSet<&str> = rows.iter().map(|row| row.user.as_str()).collect();
-    let mut users: Vec<&str> =
-        users.into_iter().filter(|user| count(user) > tests.lessons).collect();
+    let (of_each, people) = match tests.teachers {
+        Teachers::One => (tests.lessons, 1),
+        Teachers::Several => (1, tests.lessons),
+    };
+    let mut users: Vec<&str> = users.into_iter().filter(|user| count(user) > of_each).collect();
     rng.shuffle(&mut users);
+    let mut taught = Vec::new();
     for user in users {
         let mut own: Vec<&Row> = rows.iter().filter(|row| row.user == user).copied().collect();
         rng.shuffle(&mut own);
-        let mut taught = Vec::new();
+        let mut found = Vec::new();
         for row in own {
             match stage(tests, row) {
-                Ok(scene) => taught.push((row, scene)),
+                Ok(scene) => found.push((row, scene)),
                 Err(reason) => unstaged.push(reason),
             }
-            if taught.len() == tests.lessons {
-                return Some(taught);
+            if found.len() == of_each {
+                taught.append(&mut found);
+                break;
             }
+        }
+        if taught.len() == of_each * people {
+            return Some(taught);
         }
     }
     None
@@ -247,7 +271,7 @@ impl Ask<'_> {
         rows: &[&Row],
         judge: impl Fn(&Row, &Scene, &Answer, &Explain<'_>) -> (Verdict, Option<Failure>),
     ) -> Asked {
-        let explain = Explain::new(self.tests.household, self.tests.recipe);
+        let explain = Explain::new(self.tests.household, self.tests.recipe).after(self.lesson);
         let mut asked = Asked::default();
         for row in rows {
             let scene = match stage(self.tests, row) {
@@ -270,12 +294,7 @@ impl Ask<'_> {
         self.each(rows, |row, scene, answer, explain| {
             let verdict = score::judge_taught(household, scene, &row.program, &answer.outcome);
             let failed = verdict != Verdict::Right;
-            let failure = failed.then(|| {
-                let mut failure = explain.taught(row, &lesson.program, verdict, answer);
-                failure.meant =
-                    format!("{} (taught: {:?})", failure.meant, lesson.sentence.as_str());
-                failure
-            });
+            let failure = failed.then(|| explain.taught(row, &lesson.program, verdict, answer));
             (verdict, failure)
         })
     }
@@ -289,8 +308,6 @@ impl Ask<'_> {
             let failure = accepted.then(|| {
                 let mut failure = explain.taught(row, &lesson.program, verdict, answer);
                 failure.reason = format!("{} taken for {}", row.label, lesson.label);
-                failure.meant =
-                    format!("{} (taught: {:?})", failure.meant, lesson.sentence.as_str());
                 failure
             });
             (verdict, failure)

@@ -3,9 +3,10 @@
 use std::fmt;
 
 use super::corpus::Row;
+use super::draw;
 use super::score::{self, Verdict};
 use crate::grounding::Abstractor;
-use crate::language::{Answer, Mention, Outcome, Program, Step, Symbol, Utterance};
+use crate::language::{Answer, Evidence, Mention, Outcome, Program, Step, Symbol, Utterance};
 use crate::learning::Recipe;
 use crate::world::Domain;
 use crate::world::household::{Household, Kind, Scene};
@@ -15,11 +16,20 @@ use crate::world::household::{Household, Kind, Scene};
 pub struct Failure {
     pub verdict: Verdict,
     pub reason: String,
+    /// The row of the corpus.
+    pub id: String,
     pub sentence: String,
+    /// The row that was taught, and its sentence.
+    pub taught: Option<(String, String)>,
     pub meant: String,
     pub got: String,
-    /// The nearest exemplar with its distance and the threshold.
+    /// The nearest exemplar.
     pub nearest: String,
+    /// Whether that is one of the system's own sentences; otherwise it is somebody's.
+    pub seed: bool,
+    /// How far the nearest exemplar is, and how far it might be.
+    pub distance: String,
+    pub lifted: String,
 }
 
 impl Failure {
@@ -39,14 +49,46 @@ impl Failure {
         kept.sort_by(|a, b| (a.verdict, &a.reason).cmp(&(b.verdict, &b.reason)));
         kept
     }
+
+    /// `count` of each verdict, whatever the reason, each equally likely.
+    ///
+    /// - `purpose`: names the draw.
+    pub fn draw<'f>(
+        all: impl Iterator<Item = &'f Failure>,
+        purpose: &str,
+        count: usize,
+    ) -> Vec<Failure> {
+        let all: Vec<&Failure> = all.collect();
+        let of = |verdict: &Verdict| {
+            let of: Vec<&Failure> =
+                all.iter().filter(|failure| failure.verdict == *verdict).copied().collect();
+            let mut rng = draw::rng(0, &["cases", purpose, &format!("{verdict:?}")]);
+            draw::some(&mut rng, &of, count)
+        };
+        let verdicts = [Verdict::Right, Verdict::Wrong, Verdict::Impossible, Verdict::NotSure];
+        verdicts.iter().flat_map(of).cloned().collect()
+    }
+
+    /// A row of a table in Markdown without any recorded sentence, for a page that may not show
+    /// them: row, what was meant, what came of it, why, and what was nearest.
+    pub fn case(&self) -> String {
+        let Failure { id, meant, got, reason, distance, .. } = self;
+        let nearest = if self.seed { &self.nearest } else { "a lesson" };
+        let taught = self.taught.iter().map(|(id, _)| format!(" after `{id}`"));
+        let taught: String = taught.collect();
+        format!("| `{id}`{taught} | {meant} | {got} | {reason} | {nearest} {distance} |")
+    }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "  {:?}", self.sentence)?;
+        writeln!(f, "  {:?} ({})", self.sentence, self.id)?;
+        if let Some((id, sentence)) = &self.taught {
+            writeln!(f, "    taught   {sentence:?} ({id})")?;
+        }
         writeln!(f, "    meant    {}", self.meant)?;
         writeln!(f, "    got      {}", self.got)?;
-        write!(f, "    nearest  {}", self.nearest)
+        write!(f, "    nearest  {} {}; lifted {:?}", self.nearest, self.distance, self.lifted)
     }
 }
 
@@ -54,11 +96,22 @@ impl fmt::Display for Failure {
 pub struct Explain<'a> {
     household: &'a Household,
     recipe: &'a Recipe,
+    /// What was taught, where something was.
+    lesson: Option<&'a Row>,
 }
 
 impl<'a> Explain<'a> {
     pub fn new(household: &'a Household, recipe: &'a Recipe) -> Explain<'a> {
-        Explain { household, recipe }
+        Explain { household, recipe, lesson: None }
+    }
+
+    /// Of a mind that was taught this.
+    pub fn after(self, lesson: &'a Row) -> Explain<'a> {
+        Explain { lesson: Some(lesson), ..self }
+    }
+
+    pub(super) fn recipe(&self) -> &Recipe {
+        self.recipe
     }
 
     /// Why a sentence for one primitive was not understood.
@@ -87,7 +140,7 @@ impl<'a> Explain<'a> {
             }
             Outcome::NotSure => self.unsure(core, &mentions, held.as_ref(), answer),
         };
-        failure(row, verdict, reason, answer)
+        self.failure(row, verdict, reason, answer)
     }
 
     /// Why a sentence that nobody taught was taken for something.
@@ -104,7 +157,7 @@ impl<'a> Explain<'a> {
             }
             Outcome::NotSure => "untaught".to_owned(),
         };
-        failure(row, verdict, reason, answer)
+        self.failure(row, verdict, reason, answer)
     }
 
     /// Why a sentence for something taught was not recognised.
@@ -134,7 +187,7 @@ impl<'a> Explain<'a> {
                 format!("taken for {operators}; the world says: {}", pattern(reason))
             }
         };
-        failure(row, verdict, reason, answer)
+        self.failure(row, verdict, reason, answer)
     }
 
     fn mentions(&self, sentence: &Utterance) -> Vec<Mention> {
@@ -197,32 +250,39 @@ impl<'a> Explain<'a> {
         }
         .to_owned()
     }
-}
 
-fn failure(row: &Row, verdict: Verdict, reason: String, answer: &Answer) -> Failure {
-    let got = match &answer.outcome {
-        Outcome::Understood { program, .. } => program.to_string(),
-        Outcome::Impossible { program, reason, .. } => format!("impossible: {program} ({reason})"),
-        Outcome::NotSure => match answer.evidence.discarded.first() {
-            Some(discarded) => {
-                format!("not sure: dropped {} ({})", discarded.program, discarded.reason)
+    fn failure(&self, row: &Row, verdict: Verdict, reason: String, answer: &Answer) -> Failure {
+        let got = match &answer.outcome {
+            Outcome::Understood { program, .. } => program.to_string(),
+            Outcome::Impossible { program, reason, .. } => {
+                format!("impossible: {program} ({reason})")
             }
-            None => "not sure".to_owned(),
-        },
-    };
-    let threshold = answer.evidence.threshold;
-    let nearest = match answer.evidence.nearest.first() {
-        Some(near) => format!("{} at {:.3} of {threshold:.3}", near.exemplar, near.distance),
-        None => "nothing".to_owned(),
-    };
-    let lifted: Vec<String> = answer.evidence.lifted.iter().map(ToString::to_string).collect();
-    Failure {
-        verdict,
-        reason,
-        sentence: row.sentence.to_string(),
-        meant: row.program.to_string(),
-        got,
-        nearest: format!("{nearest}; lifted {:?}", lifted.join(" | ")),
+            Outcome::NotSure => match answer.evidence.discarded.first() {
+                Some(discarded) => {
+                    format!("not sure: dropped {} ({})", discarded.program, discarded.reason)
+                }
+                None => "not sure".to_owned(),
+            },
+        };
+        let Evidence { lifted, nearest, threshold, .. } = &answer.evidence;
+        let nearest = nearest.first();
+        let lifted: Vec<String> = lifted.iter().map(ToString::to_string).collect();
+        let seeds = self.household.seeds().exemplars.len();
+        let taught = |lesson: &Row| (lesson.id.clone(), lesson.sentence.to_string());
+        Failure {
+            verdict,
+            reason,
+            id: row.id.clone(),
+            sentence: row.sentence.to_string(),
+            taught: self.lesson.map(taught),
+            meant: row.program.to_string(),
+            got,
+            nearest: nearest.map_or("nothing".to_owned(), |near| near.exemplar.to_string()),
+            seed: nearest.is_none_or(|near| (near.number as usize) < seeds),
+            distance: nearest
+                .map_or(String::new(), |near| format!("at {:.3} of {threshold:.3}", near.distance)),
+            lifted: lifted.join(" | "),
+        }
     }
 }
 
@@ -275,6 +335,10 @@ fn pattern(reason: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learning::train;
+    use crate::study::primitives::answer;
+    use crate::study::scenes::{Clashes, Stages};
+    use crate::world::household::Room;
 
     #[test]
     fn reasons_of_the_world_are_counted_without_their_things() {
@@ -282,6 +346,47 @@ mod tests {
         let two = pattern("the robot does not hold an Apple: its hand is empty");
         assert_eq!(one, two);
         assert!(!one.contains("Mug"), "{one}");
+    }
+
+    #[test]
+    fn a_case_shows_no_recorded_sentence() {
+        let household = Household::new();
+        let recipe = Recipe::parse(Recipe::builtin("paper").unwrap()).unwrap();
+        let row = |words: &str| Row::about(Room::Kitchen, words, "PICKUP Mug");
+        let (row, lesson) = (row("quaffle the zibber"), row("wuzzle my dax"));
+        let mind = train(&household, &recipe, &[]).unwrap();
+        let stages = Stages::new(&household);
+        let scene = stages.set(&row, Clashes::Avoided, &mut draw::rng(1, &["test"])).unwrap();
+        let answer = answer(&household, &mind, &scene, &row);
+        let explain = Explain::new(&household, &recipe).after(&lesson);
+        let failure = explain.taught(&row, &lesson.program, Verdict::NotSure, &answer);
+        let (case, shown) = (failure.case(), failure.to_string());
+        for word in ["quaffle", "zibber", "wuzzle", "dax"] {
+            assert!(!case.contains(word) && shown.contains(word), "{word}: {case}\n{shown}");
+        }
+        assert!(case.contains("PICKUP Mug") && case.contains(&row.id), "{case}");
+    }
+
+    #[test]
+    fn cases_are_drawn_from_each_verdict_whatever_the_reason() {
+        let household = Household::new();
+        let recipe = Recipe::parse(Recipe::builtin("tiny").unwrap()).unwrap();
+        let explain = Explain::new(&household, &recipe);
+        let row = Row::about(Room::Kitchen, "wuzzle the mug", "PICKUP Mug");
+        let not_sure =
+            Answer { outcome: Outcome::NotSure, evidence: Evidence::default(), mentioned: None };
+        let failed = |number: usize| {
+            let verdict = [Verdict::Wrong, Verdict::NotSure][number % 2];
+            let row = Row { id: number.to_string(), ..row.clone() };
+            explain.failure(&row, verdict, format!("reason {}", number % 7), &not_sure)
+        };
+        let all: Vec<Failure> = (0..100).map(failed).collect();
+        let drawn = Failure::draw(all.iter(), "test", 10);
+        let verdicts: Vec<Verdict> = drawn.iter().map(|failure| failure.verdict).collect();
+        assert_eq!(verdicts, [[Verdict::Wrong; 10], [Verdict::NotSure; 10]].concat());
+        let beyond_the_first = drawn.iter().any(|failure| failure.id.len() > 1);
+        assert!(beyond_the_first, "{drawn:?}");
+        assert_eq!(drawn, Failure::draw(all.iter(), "test", 10));
     }
 
     #[test]

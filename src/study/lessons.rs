@@ -38,6 +38,8 @@ pub struct LessonsReport {
     pub episodes: usize,
     /// Sentences taught in each.
     pub lessons: usize,
+    /// Whether all were one person's: `one` or `several`.
+    pub teachers: String,
     /// Lessons that could not be learned; the mind of before was asked then.
     pub trainings_failed: BTreeMap<String, usize>,
     #[serde(flatten)]
@@ -47,6 +49,9 @@ pub struct LessonsReport {
     pub reasons: BTreeMap<String, Reasons>,
     #[serde(skip)]
     pub failures: BTreeMap<String, Vec<Failure>>,
+    /// Failures without their sentences, by figure.
+    #[serde(skip)]
+    pub cases: BTreeMap<&'static str, Vec<Failure>>,
 }
 
 /// The figures of some episodes.
@@ -68,6 +73,9 @@ pub struct Figures {
     pub distractors_short_accepted: Spread,
     /// Sentences for a primitive: still right.
     pub primitives_right: Spread,
+    /// Of the sentences of all these kinds that were carried out as the lesson, those that meant
+    /// it. What repeats the taught sentence does not count.
+    pub lesson_precision: Spread,
 }
 
 impl Figures {
@@ -84,6 +92,7 @@ impl Figures {
             distractors_accepted: spread(|e| e.distractors.accepted()),
             distractors_short_accepted: spread(|e| e.distractors.short().accepted()),
             primitives_right: spread(|e| e.primitives.right()),
+            lesson_precision: spread(Episode::lesson_precision),
         }
     }
 }
@@ -116,6 +125,7 @@ pub fn lessons(
             primitives: &primitives,
             seed,
             lessons: setting.lessons,
+            teachers: setting.teachers,
         };
         let numbers: Vec<usize> = (0..setting.limit.unwrap_or(EPISODES)).collect();
         let of_seed =
@@ -125,6 +135,7 @@ pub fn lessons(
     let mut trainings_failed = BTreeMap::new();
     let mut reasons: BTreeMap<String, Reasons> = BTreeMap::new();
     let mut failures = BTreeMap::new();
+    let mut cases = BTreeMap::new();
     for episode in &episodes {
         if let Some(reason) = &episode.training_failed {
             *trainings_failed.entry(reason.clone()).or_default() += 1;
@@ -138,6 +149,7 @@ pub fn lessons(
         let mut counted = Reasons::default();
         failed().for_each(|failure| counted.add(failure.verdict, &failure.reason));
         reasons.insert(name.to_owned(), counted);
+        cases.insert(name, Failure::draw(failed(), name, setting.cases));
         failures.insert(name.to_owned(), Failure::choose(failed().cloned(), setting.failures));
     }
     let by_action = material.groups.iter().map(|(group, _)| {
@@ -148,11 +160,13 @@ pub fn lessons(
         base,
         episodes: episodes.len(),
         lessons: setting.lessons,
+        teachers: setting.teachers.to_string(),
         trainings_failed,
         figures: Figures::of(episodes.iter()),
         by_action: by_action.collect(),
         reasons,
         failures,
+        cases,
     })
 }
 

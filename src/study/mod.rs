@@ -17,6 +17,7 @@ pub mod one_shot;
 pub mod parallel;
 pub mod people;
 pub mod primitives;
+pub mod promise;
 mod renaming;
 pub mod report;
 pub mod scenes;

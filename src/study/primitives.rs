@@ -10,6 +10,7 @@ use super::draw;
 use super::failures::{Explain, Failure};
 use super::figures::{Reasons, Shares, Spread, share};
 use super::parallel::in_order;
+use super::promise::{Kept, Promise, surety};
 use super::report::{Base, Setting};
 use super::scenes::{Clashes, Stages};
 use super::score::{self, Verdict};
@@ -39,6 +40,8 @@ pub struct PrimitivesReport {
     pub by_action: BTreeMap<String, Shares>,
     /// The same figures once for each person, and then their mean: few people wrote most rows.
     pub by_person: ByPerson,
+    /// The precision that the threshold promises, and the one that people meet.
+    pub promise: Promise,
     /// The same sentences with other things of the same name in the scene.
     pub clashes: Shares,
     /// Per seed, the shares of that seed alone.
@@ -49,6 +52,9 @@ pub struct PrimitivesReport {
     pub reasons: Reasons,
     #[serde(skip)]
     pub failures: Vec<Failure>,
+    /// Failures without their sentences, by what was asked.
+    #[serde(skip)]
+    pub cases: BTreeMap<&'static str, Vec<Failure>>,
 }
 
 /// Shares of single people, averaged. Nobody is named.
@@ -63,7 +69,7 @@ pub struct ByPerson {
 }
 
 /// How many of the worst people are reported.
-const WORST: usize = 5;
+pub(super) const WORST: usize = 5;
 
 impl ByPerson {
     fn of(judged: &[Judged]) -> ByPerson {
@@ -144,7 +150,7 @@ pub fn primitives(setting: &Setting<'_>, rows: &[Row]) -> Result<PrimitivesRepor
         }
         by_seed.push(Shares::of(&plain));
     }
-    Ok(summarise(base, judged, by_seed, training, setting.failures))
+    Ok(summarise(setting, base, judged, by_seed, training))
 }
 
 /// One sentence, judged.
@@ -154,6 +160,7 @@ struct Judged {
     untaught: bool,
     verdict: Verdict,
     distance: f32,
+    sure: f64,
     /// With things of the same name about; none for the untaught, and where no such scene exists.
     clashing: Option<(Verdict, f32)>,
     failure: Option<Failure>,
@@ -193,8 +200,9 @@ fn judge(
         false => explain.primitive(row, &scene, verdict, &answer),
     });
     let distance = score::distance(&answer.evidence);
+    let sure = surety(explain.recipe(), distance, answer.evidence.threshold);
     let (label, user) = (row.label.clone(), row.user.clone());
-    Ok(Judged { label, user, untaught, verdict, distance, clashing, failure })
+    Ok(Judged { label, user, untaught, verdict, distance, sure, clashing, failure })
 }
 
 /// The answer to a row's sentence, said in a scene at the start of an episode.
@@ -205,11 +213,11 @@ pub(super) fn answer(household: &Household, mind: &Mind, scene: &Scene, row: &Ro
 }
 
 fn summarise(
+    setting: &Setting<'_>,
     base: Base,
     judged: Vec<Judged>,
     by_seed: Vec<Shares>,
     training: BTreeMap<String, f64>,
-    failures: usize,
 ) -> PrimitivesReport {
     let by_person = ByPerson::of(&judged);
     let (untaught, primitives): (Vec<&Judged>, Vec<&Judged>) =
@@ -227,6 +235,16 @@ fn summarise(
     };
     let accepted = of(&[Verdict::Right, Verdict::Wrong, Verdict::Impossible]);
     let clashing: Vec<(Verdict, f32)> = primitives.iter().filter_map(|one| one.clashing).collect();
+    let kept: Vec<Kept<'_>> = primitives
+        .iter()
+        .map(|one| Kept { user: &one.user, verdict: one.verdict, sure: one.sure })
+        .collect();
+    let unknown_accepted = training.get("unknown_accepted").copied().unwrap_or(0.0);
+    let promise = Promise::of(setting.recipe, unknown_accepted, &kept);
+    let cases = [("primitives", &primitives), ("untaught", &untaught)].map(|(name, judged)| {
+        let failed = judged.iter().filter_map(|one| one.failure.as_ref());
+        (name, Failure::draw(failed, name, setting.cases))
+    });
     let mut reasons = Reasons::default();
     for failure in judged.iter().filter_map(|one| one.failure.as_ref()) {
         reasons.add(failure.verdict, &failure.reason);
@@ -239,10 +257,15 @@ fn summarise(
         untaught_right: share(of(&[Verdict::Right]), untaught.len()),
         by_action,
         by_person,
+        promise,
         clashes: Shares::of(&clashing),
         by_seed,
         training,
         reasons,
-        failures: Failure::choose(judged.into_iter().filter_map(|one| one.failure), failures),
+        cases: cases.into(),
+        failures: Failure::choose(
+            judged.into_iter().filter_map(|one| one.failure),
+            setting.failures,
+        ),
     }
 }

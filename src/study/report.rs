@@ -1,6 +1,8 @@
 //! What every protocol takes and what every report begins with.
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
 
 use serde::Serialize;
 
@@ -19,10 +21,23 @@ pub struct Setting<'a> {
     pub people: People,
     pub threads: usize,
     pub progress: &'a dyn Progress,
-    /// Sentences of the teacher that an episode teaches.
+    /// Sentences that an episode teaches.
     pub lessons: usize,
-    /// Failures kept of each kind.
+    pub teachers: Teachers,
+    /// Failures kept of each kind, with their sentences.
     pub failures: usize,
+    /// Failures drawn of each verdict, without their sentences.
+    pub cases: usize,
+}
+
+/// Whose sentences an episode teaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Teachers {
+    /// All are one person's.
+    #[default]
+    One,
+    /// Each is another person's.
+    Several,
 }
 
 /// What every report begins with.
@@ -49,6 +64,26 @@ impl Unstaged {
     pub fn add(&mut self, reason: String) {
         self.n += 1;
         *self.reasons.entry(reason).or_default() += 1;
+    }
+}
+
+impl fmt::Display for Teachers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Teachers::One => "one",
+            Teachers::Several => "several",
+        })
+    }
+}
+
+impl FromStr for Teachers {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Teachers, String> {
+        match text {
+            "one" => Ok(Teachers::One),
+            "several" => Ok(Teachers::Several),
+            other => Err(format!("{other:?} is neither one nor several")),
+        }
     }
 }
 

@@ -1,11 +1,13 @@
 //! Reports for people.
 
+use std::collections::BTreeMap;
 use std::fmt::{self, Display, Write};
 
 use super::failures::Failure;
 use super::figures::{Reasons, Shares, Spread};
 use super::lessons::{Figures, LessonsReport};
 use super::primitives::PrimitivesReport;
+use super::promise::{Band, Promise};
 use super::report::Base;
 
 /// Reasons shown of each verdict; the rest is added up.
@@ -68,8 +70,10 @@ impl Display for PrimitivesReport {
             let worst = worst.join(", ");
             writeln!(f, "{name:<22}{:>10}{:>9}{n:>9}   {worst}", percent(mean), percent(sd))?;
         }
+        write!(f, "{}", self.promise)?;
         reasons(f, "Why not right", &self.reasons)?;
-        failures(f, "Failures", &self.failures)
+        failures(f, "Failures", &self.failures)?;
+        cases(f, &self.cases)
     }
 }
 
@@ -78,7 +82,7 @@ impl Display for LessonsReport {
         write!(f, "{}", self.base)?;
         write!(f, "{} episodes", self.episodes)?;
         if self.lessons > 1 {
-            write!(f, ", {} lessons each", self.lessons)?;
+            write!(f, ", {} lessons each (teachers: {})", self.lessons, self.teachers)?;
         }
         match self.trainings_failed.values().sum::<usize>() {
             0 => writeln!(f)?,
@@ -99,6 +103,7 @@ impl Display for LessonsReport {
         for (figure, of_figure) in &self.failures {
             failures(f, &format!("Failures: {figure}"), of_figure)?;
         }
+        cases(f, &self.cases)?;
         Ok(())
     }
 }
@@ -113,7 +118,7 @@ fn shares(f: &mut fmt::Formatter<'_>, name: &str, shares: &Shares) -> fmt::Resul
 }
 
 fn figures(f: &mut fmt::Formatter<'_>, figures: &Figures, indent: &str) -> fmt::Result {
-    let rows: [(&str, Spread); 8] = [
+    let rows: [(&str, Spread); 9] = [
         ("same sentence, other thing", figures.same_sentence),
         ("same person", figures.same_person),
         ("others, short", figures.others_short),
@@ -122,6 +127,7 @@ fn figures(f: &mut fmt::Formatter<'_>, figures: &Figures, indent: &str) -> fmt::
         ("distractors accepted", figures.distractors_accepted),
         ("  of them short", figures.distractors_short_accepted),
         ("primitives right", figures.primitives_right),
+        ("precision as the lesson", figures.lesson_precision),
     ];
     for (name, Spread { mean, sd, n }) in rows {
         let name = format!("{indent}{name}");
@@ -158,6 +164,41 @@ fn failures(f: &mut fmt::Formatter<'_>, title: &str, failures: &[Failure]) -> fm
         writeln!(f, "{failure}")?;
     }
     Ok(())
+}
+
+/// Tables in Markdown, one for each verdict.
+fn cases(f: &mut fmt::Formatter<'_>, cases: &BTreeMap<&'static str, Vec<Failure>>) -> fmt::Result {
+    for (asked, failures) in cases {
+        for of_verdict in failures.chunk_by(|one, next| one.verdict == next.verdict) {
+            writeln!(f, "\nCases: {asked}, {:?}\n", of_verdict[0].verdict)?;
+            writeln!(f, "| row | meant | got | why | nearest |\n|---|---|---|---|---|")?;
+            of_verdict.iter().try_for_each(|failure| writeln!(f, "{}", failure.case()))?;
+        }
+    }
+    Ok(())
+}
+
+impl Display for Promise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Promise { promised, achieved, by_person, people_below, unknown_accepted, .. } = self;
+        writeln!(
+            f,
+            "\nprecision: {} promised, {} achieved; {} ± {} over {} people, {} of them below",
+            percent(*promised),
+            percent(*achieved),
+            percent(by_person.mean),
+            percent(by_person.sd),
+            by_person.n,
+            percent(*people_below)
+        )?;
+        writeln!(f, "unknown requests accepted when calibrated: {}", percent(*unknown_accepted))?;
+        writeln!(f, "  {:<10}{:>8}{:>10}{:>10}", "surety", "n", "mean", "right")?;
+        for Band { from, n, sure, right } in &self.bands {
+            let from = format!("{:.2} on", from);
+            writeln!(f, "  {from:<10}{n:>8}{:>10}{:>10}", percent(*sure), percent(*right))?;
+        }
+        Ok(())
+    }
 }
 
 fn percent(share: f64) -> String {
