@@ -135,10 +135,10 @@ fn a_far_thing_is_walked_to_only_where_the_recipe_says_so() {
     talk.check("pick up the tomato", "! the Tomato is out of reach");
     let mut talk = Talk::new("default");
     talk.check("pick up the tomato", "GOTO Tomato; PICKUP Tomato");
-    talk.check(
-        "put it in the sink, then turn on the faucet",
-        "GOTO SinkBasin; PUT Tomato SinkBasin; TOGGLE Faucet",
-    );
+    // Said in one, it is a means to something that nobody named; said step by step it is not.
+    talk.check("put it in the sink, then turn on the faucet", "?");
+    talk.check("put it in the sink", "GOTO SinkBasin; PUT Tomato SinkBasin");
+    talk.check("turn on the faucet", "TOGGLE Faucet");
     talk.check("turn on the lamp", "GOTO FloorLamp; TOGGLE FloorLamp");
 }
 
