@@ -188,13 +188,32 @@ fn one_disk(images: usize, syncs: Syncs, dice: &mut Dice, counts: &mut Counts) {
             thread::sleep(Duration::from_micros(dice.below(300_000) as u64));
             // What is acknowledged now must be in the copy that begins now.
             let promised: Vec<_> = ledgers.iter().map(Ledger::acknowledged).collect();
-            run("cp", &["--reflink=never".as_ref(), &image, &copy]);
+            server.signal("STOP");
+            copy_at_one_moment(&image, &copy);
+            server.signal("CONT");
             counts.images += 1;
             let cut = Disk::mount(&copy, &folder.path().join("after"), "rw");
             look(&cut, &ledgers, &promised, dice, counts);
         }
         server.kill();
     });
+}
+
+/// Copies the image as it stands at one moment. A copy takes time, and what is written meanwhile
+/// would give a file system that no power cut leaves: half of one moment and half of a later one. So
+/// it is taken until two in a row are the same, while the service is stopped between any two of
+/// its instructions. Nothing is synced; the kernel only ends what it had begun to write.
+fn copy_at_one_moment(image: &Path, copy: &Path) {
+    let again = copy.with_extension("again");
+    for _ in 0..100 {
+        run("cp", &["--reflink=never".as_ref(), image, copy]);
+        run("cp", &["--reflink=never".as_ref(), image, &again]);
+        let same = Command::new("cmp").arg("--silent").args([copy, &again]).status().unwrap();
+        if same.success() {
+            return;
+        }
+    }
+    panic!("{} changes all the time although its writer is stopped", image.display());
 }
 
 /// Hangs up whatever happens, or the people's threads would wait for ever.

@@ -135,6 +135,13 @@ impl Server {
         }
     }
 
+    /// SIGSTOP and SIGCONT: between them the process does not run.
+    pub fn signal(&self, name: &str) {
+        let id = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-s", name, &id]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "{name} for {id}");
+    }
+
     /// SIGKILL. It must have been alive until then.
     #[track_caller]
     pub fn kill(mut self) {
