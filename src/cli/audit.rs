@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::thread;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::bar::Bar;
 use super::failure::Failure;
 use super::{past, terminal::count};
 use crate::ids::TenantId;
-use crate::replay::{self, AuditReport, Counts, Progress, Scrutiny, StreamReport};
+use crate::replay::{self, AuditReport, Counts, Scrutiny, StreamReport};
 use crate::world::household::Household;
 
 /// Hold everything recorded against what this program computes.
@@ -58,9 +58,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let streams = replay::streams_of(&past.store, tenant.as_ref()).map_err(Failure::failed)?;
     let scrutiny = Scrutiny { repropose: arguments.repropose, retrain: arguments.retrain };
     let threads = thread::available_parallelism().map_or(1, |cores| cores.get());
-    let (domain, bar) = (Arc::new(Household::new()), Bar::new());
+    let (domain, bar) = (Arc::new(Household::new()), Bar::new("records"));
     let report = replay::audit(&domain, &past.store, &streams, scrutiny, threads, &bar);
-    bar.0.finish_and_clear();
+    bar.finish();
     let text = match arguments.json {
         true => {
             let text = serde_json::to_string_pretty(&report);
@@ -137,26 +137,4 @@ fn count_lines(counts: &Counts, scrutiny: Scrutiny) -> Vec<String> {
         differ => format!("{} with differences", n(differ, "stream")),
     });
     lines
-}
-
-/// Records checked, on standard error where that is a terminal.
-struct Bar(ProgressBar);
-
-impl Bar {
-    fn new() -> Bar {
-        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(5));
-        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} records {eta} left");
-        bar.set_style(style.expect("the template is well-formed"));
-        Bar(bar)
-    }
-}
-
-impl Progress for Bar {
-    fn expect(&self, records: u64) {
-        self.0.inc_length(records);
-    }
-
-    fn advance(&self, records: u64) {
-        self.0.inc(records);
-    }
 }

@@ -2,9 +2,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
+use super::bar::Bar;
 use super::failure::Failure;
 use super::recipe;
 use crate::learning::Recipe;
@@ -12,7 +12,6 @@ use crate::study::ablation::{Ablation, Variant, ablate};
 use crate::study::corpus::{BadLine, Corpus};
 use crate::study::goals::goals;
 use crate::study::one_shot::one_shot;
-use crate::study::parallel::Progress;
 use crate::study::people::People;
 use crate::study::primitives::primitives;
 use crate::study::report::{Setting, Teachers};
@@ -112,7 +111,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 
     let one = arguments.seed.map(|seed| [seed]);
     let seeds = one.as_ref().map_or(&SEEDS[..], |one| &one[..]);
-    let bar = Bar::new();
+    let bar = Bar::new("");
     let setting = Setting {
         recipe: &recipe,
         seeds,
@@ -137,7 +136,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
             one_shot(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
         }
     };
-    bar.0.finish_and_clear();
+    bar.finish();
     let report =
         report.map_err(|error| Failure::failed(format!("recipe {}: {error}", arguments.recipe)))?;
     let mut stdout = std::io::stdout().lock();
@@ -211,26 +210,4 @@ fn check_rows(arguments: &Arguments, corpus: &Corpus) -> Result<(), Failure> {
         arguments.corpus.display(),
         arguments.people
     )))
-}
-
-/// The progress of an evaluation, on standard error where that is a terminal.
-struct Bar(ProgressBar);
-
-impl Bar {
-    fn new() -> Bar {
-        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(5));
-        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {eta} left");
-        bar.set_style(style.expect("the template is well-formed"));
-        Bar(bar)
-    }
-}
-
-impl Progress for Bar {
-    fn expect(&self, count: usize) {
-        self.0.inc_length(count as u64);
-    }
-
-    fn advance(&self) {
-        self.0.inc(1);
-    }
 }

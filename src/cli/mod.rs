@@ -2,6 +2,7 @@
 
 mod args;
 mod audit;
+mod bar;
 mod converse;
 mod data_dir;
 mod embedded;

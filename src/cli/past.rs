@@ -2,10 +2,46 @@
 
 use std::path::PathBuf;
 
-use super::data_dir;
+use clap::Args;
+
 use super::failure::Failure;
+use super::{data_dir, embedded};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::store::{self, OpenError, PrivateCopy, Store};
+
+/// Whose past.
+#[derive(Debug, Args)]
+pub struct Whose {
+    /// The data directory; it is copied first, and the copy is read
+    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The lab the person belongs to.
+    #[arg(long, value_name = "NAME", default_value = "local")]
+    tenant: String,
+    /// The person.
+    #[arg(long, value_name = "NAME")]
+    user: String,
+}
+
+/// A person's records in a copied store.
+pub struct OfOne {
+    pub past: Past,
+    pub tenant: TenantId,
+    pub user: UserId,
+    pub stream: StreamId,
+}
+
+impl Whose {
+    /// - errors: as [`open`] and [`Past::stream`], and names that are none.
+    pub fn open(self) -> Result<OfOne, Failure> {
+        let tenant = TenantId::new(&self.tenant).map_err(Failure::bad_input)?;
+        let user = embedded::user(&self.user)?;
+        let past = open(self.data)?;
+        let stream = past.stream(&tenant, &user)?;
+        Ok(OfOne { past, tenant, user, stream })
+    }
+}
 
 /// A store that was copied, for reading only.
 pub struct Past {

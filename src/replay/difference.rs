@@ -129,13 +129,8 @@ fn descend(path: &mut String, old: &Value, new: &Value) -> Option<(String, Strin
                     path.push('.');
                 }
                 path.push_str(key);
-                match (old_map.get(key), new_map.get(key)) {
-                    (Some(old), Some(new)) => {
-                        if let found @ Some(_) = descend(path, old, new) {
-                            return found;
-                        }
-                    }
-                    (old, new) => return Some((shown(old), shown(new))),
+                if let found @ Some(_) = part(path, old_map.get(key), new_map.get(key)) {
+                    return found;
                 }
                 path.truncate(length);
             }
@@ -144,13 +139,8 @@ fn descend(path: &mut String, old: &Value, new: &Value) -> Option<(String, Strin
         (Value::Array(old_list), Value::Array(new_list)) => {
             for index in 0..old_list.len().max(new_list.len()) {
                 path.push_str(&format!("[{index}]"));
-                match (old_list.get(index), new_list.get(index)) {
-                    (Some(old), Some(new)) => {
-                        if let found @ Some(_) = descend(path, old, new) {
-                            return found;
-                        }
-                    }
-                    (old, new) => return Some((shown(old), shown(new))),
+                if let found @ Some(_) = part(path, old_list.get(index), new_list.get(index)) {
+                    return found;
                 }
                 path.truncate(length);
             }
@@ -162,6 +152,14 @@ fn descend(path: &mut String, old: &Value, new: &Value) -> Option<(String, Strin
             (!equal).then(|| (shown(Some(old)), shown(Some(new))))
         }
         _ => (old != new).then(|| (shown(Some(old)), shown(Some(new)))),
+    }
+}
+
+/// As [`descend`], for a part that one of the two may lack.
+fn part(path: &mut String, old: Option<&Value>, new: Option<&Value>) -> Option<(String, String)> {
+    match (old, new) {
+        (Some(old), Some(new)) => descend(path, old, new),
+        (old, new) => Some((shown(old), shown(new))),
     }
 }
 

@@ -3,13 +3,12 @@
 mod show;
 
 use std::io::Write;
-use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
 use super::failure::Failure;
-use super::{embedded, past};
-use crate::ids::{Seq, TenantId};
+use super::past::{OfOne, Whose};
+use crate::ids::Seq;
 
 /// Read what was recorded.
 #[derive(Debug, Args)]
@@ -33,16 +32,8 @@ enum Verb {
 
 #[derive(Debug, Args)]
 struct Show {
-    /// The data directory; it is copied first, and the copy is read
-    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
-    /// The lab the person belongs to.
-    #[arg(long, value_name = "NAME", default_value = "local")]
-    tenant: String,
-    /// Whose records.
-    #[arg(long, value_name = "NAME")]
-    user: String,
+    #[command(flatten)]
+    whose: Whose,
     /// One JSON object per record, with everything in it and without times.
     #[arg(long)]
     json: bool,
@@ -55,12 +46,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 }
 
 fn show(arguments: Show) -> Result<(), Failure> {
-    let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
-    let user = embedded::user(&arguments.user)?;
-    let past = past::open(arguments.data)?;
-    let (store, stream) = (&past.store, past.stream(&tenant, &user)?);
+    let OfOne { past, stream, .. } = arguments.whose.open()?;
     let mut stdout = std::io::stdout().lock();
-    for record in store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)? {
+    for record in past.store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)? {
         let record = record.map_err(Failure::failed)?;
         let lines = match arguments.json {
             true => vec![show::json(&record)],

@@ -4,14 +4,13 @@ mod show;
 mod transcript;
 
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
 
 use super::failure::Failure;
-use super::{embedded, past};
-use crate::ids::{Seq, TenantId};
+use super::past::{OfOne, Whose};
+use crate::ids::Seq;
 use crate::replay::{self, Minds};
 use crate::world::household::Household;
 
@@ -32,16 +31,8 @@ docs/replay.md says what each digest covers.
 Exit codes: 0 the session was rebuilt; 1 the log and this program do not agree, and where; 2 the
 directory cannot be used, has no such tenant or user, or no such record.")]
 pub struct Arguments {
-    /// The data directory; it is copied first, and the copy is read
-    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
-    /// The lab the person belongs to.
-    #[arg(long, value_name = "NAME", default_value = "local")]
-    tenant: String,
-    /// Whose session.
-    #[arg(long, value_name = "NAME")]
-    user: String,
+    #[command(flatten)]
+    whose: Whose,
     /// Just after this record; the last one without it. `apprentice log show` numbers them.
     #[arg(long, value_name = "SEQ")]
     at: Option<u64>,
@@ -54,10 +45,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
-    let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
-    let user = embedded::user(&arguments.user)?;
-    let past = past::open(arguments.data)?;
-    let stream = past.stream(&tenant, &user)?;
+    let OfOne { past, tenant, user, stream } = arguments.whose.open()?;
     let head = past.store.log.head(&stream).map_err(Failure::failed)?.seq;
     let wanted = arguments.at.unwrap_or(head);
     let at = Seq::new(wanted).filter(|at| at.get() <= head).ok_or_else(|| {
