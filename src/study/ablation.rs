@@ -1,6 +1,7 @@
 //! What each difference between two recipes brings: one is taken back, or added, at a time, and
 //! everything is measured again.
 
+use std::collections::BTreeMap;
 use std::fmt::{self, Display};
 
 use serde::{Deserialize, Serialize};
@@ -83,43 +84,19 @@ fn merge(table: &mut toml::Table, set: &toml::Table) {
     }
 }
 
-/// The figures that a difference is judged by.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Figures<T> {
-    pub right: T,
-    pub wrong: T,
-    pub untaught_accepted: T,
-    pub same_person: T,
-    pub others_short: T,
-    pub others: T,
-    pub distractors_accepted: T,
-}
+/// The figures that a difference is judged by: key in JSON, title in the table.
+const FIGURES: [(&str, &str); 7] = [
+    ("right", "right"),
+    ("wrong", "wrong"),
+    ("untaught_accepted", "untaught"),
+    ("same_person", "same person"),
+    ("others_short", "others short"),
+    ("others", "others any"),
+    ("distractors_accepted", "distractors"),
+];
 
-impl<T: Copy> Figures<T> {
-    const NAMES: [&'static str; 7] =
-        ["right", "wrong", "untaught", "same person", "others short", "others any", "distractors"];
-
-    fn list(&self) -> [T; 7] {
-        let Figures { right, wrong, untaught_accepted, .. } = *self;
-        let Figures { same_person, others_short, others, distractors_accepted, .. } = *self;
-        [right, wrong, untaught_accepted, same_person, others_short, others, distractors_accepted]
-    }
-
-    fn of(list: [T; 7]) -> Figures<T> {
-        let [right, wrong, untaught_accepted, same_person, others_short, others, distractors] =
-            list;
-        let distractors_accepted = distractors;
-        Figures {
-            right,
-            wrong,
-            untaught_accepted,
-            same_person,
-            others_short,
-            others,
-            distractors_accepted,
-        }
-    }
-}
+/// A figure each, by key.
+type Figures = BTreeMap<&'static str, Spread>;
 
 /// One variant beside the recipe with everything.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -127,9 +104,9 @@ pub struct Line {
     pub difference: String,
     pub recipe_digest: String,
     /// Over seeds.
-    pub figures: Figures<Spread>,
+    pub figures: Figures,
     /// What the difference brings: the figure with it less the one without it, seed by seed.
-    pub gain: Figures<Spread>,
+    pub gain: Figures,
     /// A training failed, and why: no figures then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
@@ -172,11 +149,11 @@ pub fn ablate(
             whole.clone_from(&measured);
         }
         let over = |value: &dyn Fn(usize, usize) -> f64| {
-            Figures::of(std::array::from_fn(|figure| {
-                let values: Vec<f64> =
-                    (0..measured.len()).map(|seed| value(seed, figure)).collect();
-                Spread::of(&values)
-            }))
+            let spread = |figure: usize| {
+                let seeds = 0..measured.len();
+                Spread::of(&seeds.map(|seed| value(seed, figure)).collect::<Vec<f64>>())
+            };
+            FIGURES.iter().enumerate().map(|(place, (key, _))| (*key, spread(place))).collect()
         };
         lines.push(Line {
             difference: name.clone(),
@@ -232,15 +209,16 @@ impl Display for AblationReport {
             seeds.join(", ")
         )?;
         let head = if self.adds { "with" } else { "without" };
-        writeln!(f, "| {head} | {} |", Figures::<f64>::NAMES.join(" | "))?;
-        writeln!(f, "|---|{}", "---|".repeat(Figures::<f64>::NAMES.len()))?;
+        writeln!(f, "| {head} | {} |", FIGURES.map(|(_, title)| title).join(" | "))?;
+        writeln!(f, "|---|{}", "---|".repeat(FIGURES.len()))?;
         for (number, line) in self.lines.iter().enumerate() {
             write!(f, "| {} |", line.difference)?;
             if let Some(reason) = &line.failed {
                 writeln!(f, " training fails: {reason} |")?;
                 continue;
             }
-            for (figure, gain) in line.figures.list().iter().zip(line.gain.list()) {
+            for (key, _) in FIGURES {
+                let (figure, gain) = (line.figures[key], line.gain[key]);
                 let mean = figure.mean * 100.0;
                 match number {
                     0 => write!(f, " **{mean:.1}** |")?,
