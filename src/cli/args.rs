@@ -4,7 +4,8 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{converse, eval, log, serve, talk, transcript};
+use super::{check_copy, converse, eval, export, import, log, salvage, serve, talk, transcript};
+use crate::store;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -17,6 +18,7 @@ Examples:
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada
   apprentice transcript check tests/transcripts/*.txt
   apprentice log show --data demo --user you
+  apprentice salvage --data demo --out rescued
 
 Exit codes:
   0  fine; the end of input is fine too
@@ -46,6 +48,11 @@ enum Verb {
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
+    Salvage(salvage::Arguments),
+    Export(export::Arguments),
+    Import(import::Arguments),
+    #[command(hide = true)]
+    CheckCopy(check_copy::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit code.
@@ -58,6 +65,12 @@ pub fn main() -> ExitCode {
 }
 
 fn run(arguments: CommandLine) -> Result<(), Failure> {
+    if let Some(Verb::CheckCopy(arguments)) = arguments.command {
+        return check_copy::run(&arguments);
+    }
+    if let Ok(program) = std::env::current_exe() {
+        store::check_with(program);
+    }
     // Who serves others wants to see that it runs; who talks wants to see the conversation.
     let filter = match arguments.command {
         Some(Verb::Serve(_)) => "info",
@@ -71,6 +84,10 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
+        Some(Verb::Salvage(arguments)) => salvage::run(arguments),
+        Some(Verb::Export(arguments)) => export::run(arguments),
+        Some(Verb::Import(arguments)) => import::run(arguments),
+        Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }
 }
 

@@ -1,14 +1,18 @@
 //! The command line: one file per command, and the conversation in a terminal.
 
 mod args;
+mod check_copy;
 mod converse;
 mod data_dir;
 mod embedded;
 mod eval;
+mod export;
 mod failure;
+mod import;
 mod log;
 mod logging;
 mod recipe;
+mod salvage;
 mod serve;
 mod talk;
 mod terminal;

@@ -3,6 +3,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::check;
 use super::files::make_dir;
 use super::open::{lock_existing, open_log};
 use super::{Entropy, Keys, OpenError, OsEntropy, Store};
@@ -31,10 +32,14 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     let copy = PrivateCopy { dir: target, keys: dir.join("keys") };
     let copied = make_dir(&copy.dir)
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
-        .and_then(|()| match fs::copy(dir.join("HEADS"), copy.dir.join("HEADS")) {
-            // That is for the opening to report.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            copied => copied.map(|_| ()),
+        .and_then(|_| {
+            ["HEADS", "CLOSED-log"].iter().try_for_each(|name| {
+                match fs::copy(dir.join(name), copy.dir.join(name)) {
+                    // That is for the opening to report.
+                    Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+                    copied => copied.map(|_| ()),
+                }
+            })
         });
     copied.map_err(|error| OpenError::Io {
         dir: dir.display().to_string(),
@@ -49,6 +54,7 @@ impl PrivateCopy {
     ///
     /// Errors name the copy's own directory as the place where the damage was seen.
     pub fn open(&self) -> Result<Store, OpenError> {
+        check::log_before_opening(&self.dir)?;
         let lock = self.dir.join("LOCK");
         let lock = fs::File::create(&lock).map_err(|error| OpenError::Io {
             dir: self.dir.display().to_string(),
@@ -57,7 +63,7 @@ impl PrivateCopy {
         })?;
         let lock = super::open::lock(&self.dir, lock)?;
         let keys = Arc::new(Keys::open_read_only(&self.keys, Arc::new(OsEntropy)));
-        let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock))?;
+        let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock), false)?;
         Ok(Store::around(Arc::new(log), keys))
     }
 }
@@ -70,15 +76,19 @@ impl Drop for PrivateCopy {
     }
 }
 
-fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
+/// Copies a directory with all that is in it.
+///
+/// - returns: the bytes copied.
+pub(super) fn copy_tree(from: &Path, to: &Path) -> io::Result<u64> {
+    let mut bytes = 0;
     make_dir(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
         let (source, target) = (entry.path(), to.join(entry.file_name()));
-        match entry.file_type()?.is_dir() {
+        bytes += match entry.file_type()?.is_dir() {
             true => copy_tree(&source, &target)?,
-            false => fs::copy(&source, &target).map(|_| ())?,
-        }
+            false => fs::copy(&source, &target)?,
+        };
     }
-    Ok(())
+    Ok(bytes)
 }

@@ -1,12 +1,17 @@
 //! The log on `sled`: one tree per tenant, one committer, group commit.
 
+mod adopt;
 mod cache;
+mod check;
 mod commit;
 mod read;
 #[cfg(test)]
 mod tests;
 
+pub(super) use self::adopt::Adopter;
 pub(super) use self::cache::SledCache;
+pub(super) use self::check::{check_cache, check_log};
+pub(super) use self::read::{KEY_BYTES, chunk_key};
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -18,6 +23,7 @@ use std::thread::JoinHandle;
 
 use self::commit::{Committer, Job, Syncer};
 use self::read::{Records, frame_at, last_seqs};
+use super::closed::{ClosedMark, Part};
 use super::heads::{Heads, HeadsFile};
 use super::log::{Pending, ReadError};
 use super::quiet::guarded;
@@ -41,7 +47,8 @@ pub struct SledLog {
     shared: Arc<Shared>,
     sender: Option<SyncSender<Job>>,
     committer: Option<JoinHandle<()>>,
-    /// Held until the database is closed: fields are dropped in this order.
+    /// Left when the database is closed: fields are dropped in this order.
+    mark: Option<ClosedMark>,
     _lock: Option<Arc<File>>,
 }
 
@@ -74,6 +81,9 @@ pub enum Damage {
     Record { stream: StreamId, error: ReadError },
     #[error("the heads file, which guards against lost records, is damaged: {reason}")]
     Heads { reason: String },
+    /// What a check of a copy saw and said.
+    #[error("{0}")]
+    Seen(String),
 }
 
 /// Why a log cannot be opened; `super::open` adds the directory and what to do.
@@ -91,12 +101,14 @@ impl SledLog {
         keys: Arc<Keys>,
         fresh: bool,
         lock: Arc<File>,
+        leave_mark: bool,
     ) -> Result<SledLog, LogError> {
         let mut log = SledLog::open_with(dir, keys, fresh, |path| {
             let file = OpenOptions::new().read(true).write(true).open(path)?;
             Ok(Box::new(move || file.sync_data()))
         })?;
         log._lock = Some(lock);
+        log.mark = leave_mark.then(|| ClosedMark::new(dir, Part::Log));
         Ok(log)
     }
 
@@ -120,18 +132,7 @@ impl SledLog {
         }
         let db = open_database(&database, CACHE_BYTES).map_err(LogError::Database)?;
         let heads_path = dir.join("HEADS");
-        let recorded = HeadsFile::read(&heads_path).map_err(LogError::Io)?;
-        let recorded = match (recorded, fresh) {
-            (Some(read), _) => match read.damage {
-                None => read.heads,
-                Some(reason) => return Err(LogError::Damaged(vec![Damage::Heads { reason }])),
-            },
-            (None, true) => Heads::new(),
-            (None, false) => {
-                let reason = format!("{} is missing", heads_path.display());
-                return Err(LogError::Damaged(vec![Damage::Heads { reason }]));
-            }
-        };
+        let recorded = recorded_heads(dir, fresh)?;
         let heads = guarded(|| compare(&db, &recorded)).map_err(LogError::Database)??;
         // What sled holds beyond the recorded heads was never acknowledged. It is kept, and made
         // as durable as the rest before anybody reads it.
@@ -154,7 +155,13 @@ impl SledLog {
             .name("committer".to_owned())
             .spawn(move || committer.run(&receiver))
             .map_err(LogError::Io)?;
-        Ok(SledLog { shared, sender: Some(sender), committer: Some(committer), _lock: None })
+        Ok(SledLog {
+            shared,
+            sender: Some(sender),
+            committer: Some(committer),
+            mark: None,
+            _lock: None,
+        })
     }
 
     /// The sentence that poisoned the log, if one did.
@@ -170,6 +177,12 @@ impl Drop for SledLog {
         if let Some(committer) = self.committer.take() {
             // A committer that panicked has dropped its promises: everybody heard `Gone`.
             let _ = committer.join();
+        }
+        if self.poisoned().is_some()
+            && let Some(mark) = self.mark.take()
+        {
+            // What failed may have left anything behind: no orderly end.
+            mark.forget();
         }
     }
 }
@@ -282,6 +295,19 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
     guarded(|| config.open())?.map_err(|error| error.to_string())
 }
 
+/// What the heads file of `dir` says was acknowledged.
+fn recorded_heads(dir: &Path, fresh: bool) -> Result<Heads, LogError> {
+    let damaged = |reason| Err(LogError::Damaged(vec![Damage::Heads { reason }]));
+    match HeadsFile::read(&dir.join("HEADS")).map_err(LogError::Io)? {
+        Some(read) => match read.damage {
+            None => Ok(read.heads),
+            Some(reason) => damaged(reason),
+        },
+        None if fresh => Ok(Heads::new()),
+        None => damaged("the file HEADS is missing".to_owned()),
+    }
+}
+
 /// Compares what the database holds with what was acknowledged.
 ///
 /// - returns: where each stream ends now.
@@ -366,7 +392,7 @@ impl Damage {
     pub fn stream(&self) -> Option<&StreamId> {
         match self {
             Damage::LostTail { stream, .. } | Damage::Record { stream, .. } => Some(stream),
-            Damage::Heads { .. } => None,
+            Damage::Heads { .. } | Damage::Seen(_) => None,
         }
     }
 }

@@ -6,9 +6,9 @@ use crate::language::Outcome;
 
 /// One record as a JSON object: its number, its kind and its whole body. No times, so that equal
 /// histories print equal bytes.
-pub fn json(record: &Record) -> String {
+pub fn json(record: &Record) -> Value {
     let kind = format!("{:?}", record.event.kind());
-    json!({ "seq": record.seq.get(), "kind": kind, "event": body(&record.event) }).to_string()
+    json!({ "seq": record.seq.get(), "kind": kind, "event": body(&record.event) })
 }
 
 fn body(event: &Event) -> Value {

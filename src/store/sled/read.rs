@@ -6,9 +6,9 @@ use crate::ids::{Seq, StreamKey};
 use crate::limits::STORE_VALUE_BYTES_MAX;
 
 /// stream key (16) ‖ sequence number (8) ‖ chunk (2), big-endian.
-pub(super) const KEY_BYTES: usize = 16 + 8 + 2;
+pub(in super::super) const KEY_BYTES: usize = 16 + 8 + 2;
 
-pub(super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
+pub(in super::super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
     let mut key = [0; KEY_BYTES];
     key[..16].copy_from_slice(&stream.0);
     key[16..24].copy_from_slice(&seq.to_be_bytes());
