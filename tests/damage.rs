@@ -263,9 +263,8 @@ impl Original {
 }
 
 fn is_a_sentence(text: &str) -> bool {
-    !text.is_empty()
-        && !text.contains('\n')
-        && !["panicked", "RUST_BACKTRACE", "unwrap()"].iter().any(|word| text.contains(word))
+    const INNARDS: [&str; 6] = ["panicked", "backtrace", "unwrap", "assertion", "called `", "src/"];
+    !text.is_empty() && !text.contains('\n') && !INNARDS.iter().any(|word| text.contains(word))
 }
 
 /// Judges each wound on all cores. A wound without an answer is a hang and ends the test.

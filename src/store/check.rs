@@ -26,6 +26,8 @@ const SECONDS: u64 = 60;
 const BYTES_PER_SECOND: u64 = 1024 * 1024;
 /// Address space for any directory, plus twice its size. The database's cache takes up to 200 MB.
 const MEMORY_BYTES: u64 = 1024 * 1024 * 1024;
+/// A line for each damaged stream, of which the first few are shown.
+const ANSWER_BYTES_MAX: u64 = 16 * 1024 * 1024;
 /// The last line of a child that lived to say everything.
 const END: &str = "end";
 
@@ -135,12 +137,16 @@ impl Copy {
     fn check(&self, part: Part) -> Result<(), Finding> {
         match CHECKER.get() {
             None => look(&self.dir, part),
-            Some(program) => self.ask(program, part),
+            Some(program) => self.ask(program, part, self.limit()),
         }
     }
 
+    fn limit(&self) -> Duration {
+        Duration::from_secs(SECONDS + self.bytes / BYTES_PER_SECOND)
+    }
+
     /// Has a child look. Its end, whatever it is, ends this.
-    fn ask(&self, program: &Path, part: Part) -> Result<(), Finding> {
+    fn ask(&self, program: &Path, part: Part, limit: Duration) -> Result<(), Finding> {
         let unable = |error: io::Error| {
             Finding::Database(format!("the process that checks it cannot be run: {error}"))
         };
@@ -155,14 +161,14 @@ impl Copy {
             .stderr(Stdio::null())
             .spawn()
             .map_err(unable)?;
-        let mut stdout = child.stdout.take().expect("it was piped");
+        let stdout = child.stdout.take().expect("it was piped");
         let (sender, receiver) = channel();
         let reader = std::thread::spawn(move || {
             let mut text = String::new();
-            let _ = stdout.read_to_string(&mut text);
+            // A child that goes on talking is cut off by its closed pipe.
+            let _ = stdout.take(ANSWER_BYTES_MAX).read_to_string(&mut text);
             let _ = sender.send(text);
         });
-        let limit = Duration::from_secs(SECONDS + self.bytes / BYTES_PER_SECOND);
         let said = receiver.recv_timeout(limit);
         if said == Err(RecvTimeoutError::Timeout) {
             child.kill().map_err(unable)?;
@@ -173,7 +179,7 @@ impl Copy {
             Ok(text) => verdict(&text, status),
             Err(_) => Err(Finding::Database(format!(
                 "a check of a copy did not end within {} s",
-                limit.as_secs()
+                limit.as_secs_f32()
             ))),
         }
     }
@@ -248,6 +254,33 @@ fn look(copy: &Path, part: Part) -> Result<(), Finding> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_check_that_never_ends_or_never_stops_talking_is_ended_and_becomes_a_sentence() {
+        let dir = tempfile::tempdir().unwrap();
+        let ask = |text: &str, limit| {
+            let program = dir.path().join("program");
+            write_program(&program, text);
+            let copy = Copy { dir: dir.path().join(COPY), bytes: 0 };
+            copy.ask(&program, Part::Log, limit).unwrap_err().to_string()
+        };
+        let sentence = ask("exec sleep 1000", Duration::from_millis(100));
+        assert_eq!(sentence, "a check of a copy did not end within 0.1 s");
+        let sentence = ask("exec yes damage", Duration::from_secs(60));
+        assert!(sentence.starts_with("a check of a copy was ended by signal"), "{sentence}");
+        let nobody = Copy { dir: dir.path().join(COPY), bytes: 0 };
+        let missing = nobody.ask(&dir.path().join("nobody"), Part::Log, Duration::from_secs(1));
+        assert!(missing.unwrap_err().to_string().contains("cannot be run"));
+    }
+
+    /// A shell script. Another thread's child may still hold it open for writing for a moment when
+    /// it is started, so it is written by a child of its own.
+    fn write_program(path: &Path, text: &str) {
+        let script = format!("printf '#!/bin/sh\\n{text}\\n' > \"$1\" && chmod 700 \"$1\"");
+        let status =
+            Command::new("/bin/sh").args(["-c", &script, "sh"]).arg(path).status().unwrap();
+        assert!(status.success());
+    }
 
     #[test]
     fn the_death_of_a_check_is_one_sentence() {

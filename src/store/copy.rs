@@ -15,7 +15,7 @@ use super::{Entropy, Keys, OpenError, OsEntropy, Store};
 #[derive(Debug)]
 pub struct PrivateCopy {
     dir: PathBuf,
-    keys: PathBuf,
+    original: PathBuf,
 }
 
 /// Copies the log of the closed data directory `dir` to a new directory of the system's temporary
@@ -29,7 +29,7 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     OsEntropy.fill(&mut name);
     let name = format!("apprentice-{:016x}", u64::from_be_bytes(name));
     let target = std::env::temp_dir().join(name);
-    let copy = PrivateCopy { dir: target, keys: dir.join("keys") };
+    let copy = PrivateCopy { dir: target, original: dir.to_owned() };
     let copied = make_dir(&copy.dir)
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
         .and_then(|_| {
@@ -52,8 +52,12 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
 impl PrivateCopy {
     /// The store of the copy, with empty caches in memory; new people cannot be added to it.
     ///
-    /// Errors name the copy's own directory as the place where the damage was seen.
+    /// Errors name the directory that was copied: the copy is gone when they are read.
     pub fn open(&self) -> Result<Store, OpenError> {
+        self.open_copy().map_err(|error| error.about(&self.original))
+    }
+
+    fn open_copy(&self) -> Result<Store, OpenError> {
         check::log_before_opening(&self.dir)?;
         let lock = self.dir.join("LOCK");
         let lock = fs::File::create(&lock).map_err(|error| OpenError::Io {
@@ -62,7 +66,7 @@ impl PrivateCopy {
             reason: error.to_string(),
         })?;
         let lock = super::open::lock(&self.dir, lock)?;
-        let keys = Arc::new(Keys::open_read_only(&self.keys, Arc::new(OsEntropy)));
+        let keys = Arc::new(Keys::open_read_only(&self.original.join("keys"), Arc::new(OsEntropy)));
         let log = open_log(&self.dir, keys.clone(), false, Arc::new(lock), false)?;
         Ok(Store::around(Arc::new(log), keys))
     }

@@ -70,6 +70,19 @@ pub enum OpenError {
     Damaged { dir: String, damage: Vec<Damage> },
 }
 
+impl OpenError {
+    /// The same error about the directory of which another one is a copy.
+    pub(super) fn about(self, original: &Path) -> OpenError {
+        let dir = original.display().to_string();
+        match self {
+            OpenError::Database { reason, .. } => OpenError::Database { dir, reason },
+            OpenError::Damaged { damage, .. } => OpenError::Damaged { dir, damage },
+            OpenError::Key { error, .. } => OpenError::Key { dir, error },
+            other => other,
+        }
+    }
+}
+
 fn list(damage: &[Damage]) -> String {
     let mut shown: Vec<String> = damage.iter().take(3).map(Damage::to_string).collect();
     if damage.len() > shown.len() {

@@ -281,7 +281,7 @@ impl Shared {
 
     fn tree(&self, tenant: &TenantId) -> Result<::sled::Tree, ReadError> {
         let name = format!("{TREE_PREFIX}{tenant}");
-        self.db.open_tree(name).map_err(|error| store_error(error.to_string()))
+        self.db.open_tree(name).map_err(|error| store_error(sentence(&error)))
     }
 }
 
@@ -292,7 +292,7 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
         .cache_capacity(cache_bytes)
         // Background flushing would give "durable" a second meaning.
         .flush_every_ms(None);
-    guarded(|| config.open())?.map_err(|error| error.to_string())
+    guarded(|| config.open())?.map_err(|error| sentence(&error))
 }
 
 /// What the heads file of `dir` says was acknowledged.
@@ -402,5 +402,14 @@ fn store_error(reason: String) -> ReadError {
 }
 
 fn database_error(error: ::sled::Error) -> LogError {
-    LogError::Database(error.to_string())
+    LogError::Database(sentence(&error))
+}
+
+/// An error of the database for an operator.
+fn sentence(error: &::sled::Error) -> String {
+    match error {
+        ::sled::Error::Corruption { .. } => "a page does not fit its checksum".to_owned(),
+        ::sled::Error::Io(error) => error.to_string(),
+        other => other.to_string(),
+    }
 }

@@ -162,7 +162,7 @@ impl Index {
         acknowledged: bool,
         mut accept: impl FnMut(&[u8]) -> Result<T, String>,
     ) -> Result<Vec<(Vec<u8>, T)>, String> {
-        let mut reason = format!("record {seq} is missing");
+        let mut reason = format!("no whole copy of record {seq} is there");
         let mut accepted = Vec::new();
         for frame in self.candidates(stream, seq, acknowledged) {
             match accept(&frame) {

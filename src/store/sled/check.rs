@@ -54,5 +54,5 @@ pub(in super::super) fn check_cache(path: &Path) -> Result<(), String> {
         }
         Ok::<(), ::sled::Error>(())
     })?
-    .map_err(|error| error.to_string())
+    .map_err(|error| super::sentence(&error))
 }
