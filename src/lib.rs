@@ -21,6 +21,7 @@ pub mod session;
 pub mod world;
 
 pub mod replay;
+mod sabotage;
 pub mod store;
 
 pub mod actors;

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId, UserId};
 use apprentice::store::conformance::{batch, stream};
-use apprentice::store::{Entropy, OpenError, OsEntropy, SeededEntropy, open};
+use apprentice::store::{Entropy, Found, OpenError, Origin, OsEntropy, SeededEntropy, open};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
 const FLIPS: usize = 2_000;
@@ -103,7 +103,7 @@ fn original() -> Original {
         }
     }
     for (_, who) in &people {
-        store.models.put(who, Digest::of(b"a mind"), b"a mind").unwrap();
+        store.models.put(who, &Origin::UNKNOWN, Digest::of(b"a mind"), b"a mind").unwrap();
     }
     drop(store);
     for mark in ["CLOSED-log", "CLOSED-cache"] {
@@ -131,8 +131,11 @@ fn read_everything(
         let who = store.keys.stream_id(&TenantId::local(), name).map_err(|e| say(&e))?;
         let records = store.log.read(&who, Seq::FIRST).map_err(|e| say(&e))?;
         let records: Result<Vec<_>, _> = records.collect();
-        let mind = store.models.load(&who, Digest::of(b"a mind"));
-        assert!(mind.is_none_or(|mind| mind == b"a mind"), "another mind was served");
+        let read = |bytes: &[u8]| Some(bytes.to_vec());
+        let mind = store.models.load(&who, &Origin::UNKNOWN, Digest::of(b"a mind"), read);
+        if let Found::Fits(mind) | Found::Stale(mind) = mind {
+            assert!(mind == b"a mind", "another mind was served");
+        }
         found.insert(who, records.map_err(|e| say(&e))?);
     }
     Ok(found)

@@ -228,6 +228,37 @@ fn one_lesson_is_measured_with_means_and_spreads() {
 }
 
 #[test]
+fn more_lessons_are_taught_when_asked_for() {
+    let corpus = file(&lines(&own_steps()));
+    let arguments = ["--protocol", "one-shot", "--seed", "1", "--limit", "3", "--lessons"];
+    let of = |count: &str| eval_json(corpus.path(), &[&arguments[..], &[count]].concat());
+    assert_eq!((number(&of("1"), "lessons"), number(&of("2"), "lessons")), (1.0, 2.0));
+    // Nobody in this corpus has a hundred sentences.
+    let output = eval(corpus.path(), &[&arguments[..], &["51"]].concat());
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn an_ablation_shows_what_each_difference_brings() {
+    let corpus = file(&lines(&own_steps()));
+    let list = ["[[difference]]", "name = \"approach\"", "set.execution.approach = true"];
+    let list = file(&list.map(str::to_owned));
+    let path = list.path().to_str().unwrap();
+    let report = eval_json(corpus.path(), &["--seed", "1", "--ablation", path]);
+    let lines = report["lines"].as_array().unwrap();
+    assert_eq!((lines.len(), &lines[1]["without"]), (2, &Value::from("approach")));
+    assert_ne!(lines[0]["recipe_digest"], lines[1]["recipe_digest"]);
+    for key in ["right", "wrong", "untaught_accepted", "others", "distractors_accepted"] {
+        let mean = |line: usize, what: &str| number(&lines[line][what][key], "mean");
+        let gain = mean(0, "figures") - mean(1, "figures");
+        assert!((mean(1, "gain") - gain).abs() < 1e-9 && mean(0, "gain") == 0.0, "{key}: {report}");
+    }
+    let refused = eval(corpus.path(), &["--ablation", "no/such/list"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no/such/list"));
+}
+
+#[test]
 fn whole_tasks_are_measured_without_any_sentence_for_a_step() {
     let goal = |number: usize, user: &str, sentence: &str, task: &str, prims: &str| {
         json!({
@@ -313,6 +344,7 @@ fn slice(recipe: &str, steps: &Path, whole: &Path) -> Slice {
         corpus
     };
     let setting = |limit| Setting {
+        lessons: 1,
         recipe: &recipe,
         seeds: &SEEDS,
         limit: Some(limit),

@@ -227,7 +227,7 @@ fn responses() -> Vec<(&'static str, Response)> {
             "hello answer",
             Response::Hello(Hello {
                 service: "apprentice".into(),
-                version: "0.1.0".into(),
+                version: "0.2.0".into(),
                 domain: "household".into(),
                 recipe: "default".into(),
             }),

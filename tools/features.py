@@ -62,8 +62,21 @@ LISTS = {
     "inside": "in inside into",
     "standing": "holding carrying",
     "moving": "turn look face step walk go move head",
+    # Before a verb: what follows is what the rest is for ("to chill").
+    "purposes": "to let",
+    "lasting": "until moment moments seconds minute minutes wait",
+    # Before a mention: where a way ends, and where it begins.
+    "destination": "to toward towards",
+    "leaving": "from",
+    "wherever": "where",
+    "onto": "on onto to",
+    "passed": "up down back away both",
+    "carrying_on": "up back down off",
 }
 LISTS = {name: words.split() for name, words in LISTS.items()}
+# Several words each, determiners aside: the mention behind them is a landmark.
+LISTS["landmarks"] = ["beside", "behind", "near", "by", "under", "underneath", "beneath", "below",
+                      "above", "between", "next to", "close to", "front of", "to left of", "to right of"]
 SETS = {name: set(words) for name, words in LISTS.items()}
 NO_VERBS = set("back light cool cold clean dry warm ready open position center face stand step dust salt pepper spread"
                " butter rest show ice frost core crack hose shower soap sponge iron plug stack pile cover mount range plate"
@@ -1084,7 +1097,7 @@ def report(model, recordings, choose, seed, limit, episodes):
 
 
 # ---------------------------------------------------------------- writing
-# Gained nothing (docs/features.md): the product has them not, so what is written is learned without.
+# Gained nothing measurable: the product has them not, so what is written is learned without.
 LEFT_OUT = ("primitive", "steps_shared", "undone")
 MARK = "# From here on written by tools/features.py: change the tool, not what follows."
 

@@ -9,6 +9,7 @@ use super::response::{Ask, ErrorCode, Hello, Response};
 use super::submit::{Presence, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::limits::DIRECTORY_QUEUE_MAX;
+use crate::sabotage;
 
 /// Knows who is awake, wakes whoever is asked for, and is the only one who puts people to sleep:
 /// an actor that stopped by itself while others hold its address would lose their messages.
@@ -192,6 +193,7 @@ impl Handler<Submit> for Directory {
             submit.answer.send(Response::Hello(self.hello.clone()));
             return;
         }
+        sabotage::point("directory");
         match self.people.stream_of(&submit.tenant, &submit.user) {
             Ok(stream) => self.forward(stream, submit, ctx),
             Err(reason) => submit.answer.send(Response::error(ErrorCode::Unavailable, reason)),

@@ -13,7 +13,8 @@ use super::user::UserActor;
 use super::{Failure, Hello, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
-use crate::store::Store;
+use crate::replay::{Minds, Work};
+use crate::store::{CacheCounter, CacheCounts, Store};
 use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
@@ -24,6 +25,17 @@ pub struct House {
     failure: Failure,
     awake: Arc<AwakeCount>,
     lives: Arc<AwakeCount>,
+    minds: Arc<Minds>,
+    kept_minds: CacheCounter,
+    snapshots: CacheCounter,
+}
+
+/// What waking people has cost since the start, and what their caches gave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wakings {
+    pub work: Work,
+    pub minds: CacheCounts,
+    pub snapshots: CacheCounts,
 }
 
 /// What the actors are started with.
@@ -75,6 +87,9 @@ impl Front {
 
 /// How long a stop waits for actors to fall asleep, and then for trainings to end.
 const FALL_ASLEEP: Duration = Duration::from_secs(30);
+/// The same when the service has failed: it must be seen to be gone, and nothing that it could
+/// still do in order would be kept.
+const FALL_DOWN: Duration = Duration::from_millis(200);
 
 impl House {
     /// Trains the base mind, so that nobody ever waits for it, and starts the actors.
@@ -90,11 +105,14 @@ impl House {
             recipe: recipe.name().to_owned(),
         };
         let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
+        let minds = Arc::<Minds>::default();
+        let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
         let parts = Parts {
             domain,
             store,
             recipe,
             recipe_text,
+            minds: minds.clone(),
             failure: failure.clone(),
             open: lives.enter(),
         };
@@ -126,7 +144,8 @@ impl House {
         let (directory, system) = ready
             .recv()
             .map_err(|_| ActorsError::System { reason: "their thread ended at once".to_owned() })?;
-        Ok(House { directory, system, thread: Some(thread), failure, awake, lives })
+        let thread = Some(thread);
+        Ok(House { directory, system, thread, failure, awake, lives, minds, kept_minds, snapshots })
     }
 
     pub fn front(&self) -> Front {
@@ -138,21 +157,40 @@ impl House {
         self.awake.now()
     }
 
+    /// What waking people has cost.
+    pub fn wakings(&self) -> Wakings {
+        let (minds, snapshots) = (self.kept_minds.now(), self.snapshots.now());
+        Wakings { work: self.minds.work(), minds, snapshots }
+    }
+
     /// Sends everybody to sleep, which keeps their snapshots, and closes the store.
     pub fn stop(&mut self) {
         let Some(thread) = self.thread.take() else { return };
         self.failure.stop_expected();
+        let patience = if self.failure.reason().is_some() { FALL_DOWN } else { FALL_ASLEEP };
         self.directory.do_send(SleepAll);
-        if !self.awake.wait_for_silence(FALL_ASLEEP) {
+        if !self.awake.wait_for_silence(patience) {
             tracing::warn!(awake = self.awake.now(), "stopping although not everybody sleeps");
         }
         self.system.stop();
         // A panic in there was reported by its alarm.
         let _ = thread.join();
         // A training that still runs holds the store; whoever opens it next must not find it busy.
-        if !self.lives.wait_for_silence(FALL_ASLEEP) {
+        if !self.lives.wait_for_silence(patience) {
             tracing::warn!("the store is still held by a training");
         }
+        let Wakings { work, minds, snapshots } = self.wakings();
+        tracing::info!(
+            woken = work.rebuilds,
+            events_folded = work.events_folded,
+            trained_again = work.trainings,
+            not_reproduced = work.not_reproduced,
+            stale_minds = minds.stale,
+            damaged_minds = minds.damaged,
+            stale_snapshots = snapshots.stale,
+            damaged_snapshots = snapshots.damaged,
+            "what waking people has cost"
+        );
     }
 }
 

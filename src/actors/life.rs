@@ -16,6 +16,7 @@ use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
+use crate::sabotage;
 use crate::session::{Command, Proposed, Session};
 use crate::store::{AppendError, EventLog, Store};
 use crate::world::Domain;
@@ -26,6 +27,7 @@ pub(super) struct Parts<D: Domain> {
     pub store: Store,
     pub recipe: Recipe,
     pub recipe_text: String,
+    pub minds: Arc<Minds>,
     pub failure: Failure,
     pub open: Awake,
 }
@@ -68,13 +70,13 @@ impl<D: Domain> Life<D> {
         trainer: impl FnOnce(Arc<Life<D>>) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
-        let Parts { domain, store, recipe: _, recipe_text, failure, open } = parts;
+        let Parts { domain, store, recipe: _, recipe_text, minds, failure, open } = parts;
         let life = Arc::new(Life {
             domain,
             store,
             recipe_text,
             base,
-            minds: Arc::default(),
+            minds,
             trainer: OnceLock::new(),
             places: Arc::new(Semaphore::new(TRAIN_QUEUE_MAX)),
             failure,
@@ -197,9 +199,10 @@ pub(super) fn train<D: Domain>(
     recipe: &Recipe,
     lessons: &[Lesson<D::Scene, D::Task>],
 ) -> Result<Arc<Mind>, String> {
+    sabotage::point("training");
     let mind =
         learning::train(&*life.domain, recipe, lessons).map_err(|error| error.to_string())?;
-    if let Err(error) = life.store.models.put(stream, mind.digest(), &mind.to_bytes()) {
+    if let Err(error) = replay::keep_mind(&life.store, stream, &mind) {
         // The bytes of a mind are a cache: without them the next waking trains again.
         tracing::warn!(%stream, %error, "the mind's bytes were not kept");
     }

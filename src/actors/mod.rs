@@ -11,6 +11,6 @@ mod trainer;
 mod user;
 
 pub use failure::{Alarm, Failure};
-pub use house::{ActorsError, Front, House, HouseSettings, NotTaken};
+pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
 pub use response::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
 pub use submit::{AnswerTo, Submit};

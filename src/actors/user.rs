@@ -16,6 +16,7 @@ use crate::events::{Durable, Report};
 use crate::ids::RequestId;
 use crate::learning;
 use crate::limits::{MAILBOX_MAX, WAIT_S_MAX, WAITERS_MAX};
+use crate::sabotage;
 use crate::session::{
     Command, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Told, Turn,
     reply_of,
@@ -155,7 +156,10 @@ impl<D: Domain> UserActor<D> {
         let Stage::Awake(session) = &self.stage else { return Self::done() };
         let at = session.next_at(self.life.now());
         // Rust cannot know it, but `propose` only reads: a panic leaves the session as it was.
-        let proposed = catch_unwind(AssertUnwindSafe(|| session.propose(&command, request, at)));
+        let proposed = catch_unwind(AssertUnwindSafe(|| {
+            sabotage::point("handler");
+            session.propose(&command, request, at)
+        }));
         let turn = match proposed {
             Ok(Ok(Proposed::Turn(turn))) => turn,
             Ok(Ok(Proposed::Repeat { first, last })) => {
@@ -194,7 +198,10 @@ impl<D: Domain> UserActor<D> {
     ) {
         let Stage::Awake(session) = &mut self.stage else { return };
         // A panic may leave the session half changed: it is then dropped, never used again.
-        let settled = catch_unwind(AssertUnwindSafe(|| session.settle(durable)));
+        let settled = catch_unwind(AssertUnwindSafe(|| {
+            sabotage::point("settling");
+            session.settle(durable)
+        }));
         let reply = match settled {
             Ok(Ok(reply)) => reply,
             Ok(Err(divergence)) => {

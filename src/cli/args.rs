@@ -4,7 +4,10 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{check_copy, converse, eval, export, import, log, salvage, serve, talk, transcript};
+use super::{
+    audit, check_copy, converse, eval, export, import, log, replay, salvage, self_test, serve,
+    talk, transcript,
+};
 use crate::store;
 
 const AFTER_HELP: &str = "\
@@ -18,6 +21,8 @@ Examples:
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada
   apprentice transcript check tests/transcripts/*.txt
   apprentice log show --data demo --user you
+  apprentice replay --data demo --user you --at 17
+  apprentice audit --data demo --repropose --retrain
   apprentice salvage --data demo --out rescued
 
 Exit codes:
@@ -48,6 +53,9 @@ enum Verb {
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
+    Replay(replay::Arguments),
+    Audit(audit::Arguments),
+    SelfTest(self_test::Arguments),
     Salvage(salvage::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
@@ -84,6 +92,9 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
+        Some(Verb::Replay(arguments)) => replay::run(arguments),
+        Some(Verb::Audit(arguments)) => audit::run(arguments),
+        Some(Verb::SelfTest(arguments)) => self_test::run(arguments),
         Some(Verb::Salvage(arguments)) => salvage::run(arguments),
         Some(Verb::Export(arguments)) => export::run(arguments),
         Some(Verb::Import(arguments)) => import::run(arguments),

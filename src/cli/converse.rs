@@ -2,8 +2,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::embedded::{self, Wanted};
 use super::failure::Failure;
-use super::{data_dir, embedded, recipe, terminal};
+use super::{data_dir, recipe, terminal};
 use crate::service::Data;
 
 /// The file in the data directory that remembers what was typed.
@@ -36,7 +37,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let directory = data_dir::choose(arguments.data)?;
     eprintln!("apprentice: everything is kept in {}", directory.display());
     let history = directory.join(HISTORY_FILE);
-    let service = embedded::start(Data::Directory(directory), recipe_text, Vec::new())?;
+    let service = embedded::start(Wanted::inside(Data::Directory(directory), recipe_text))?;
     let client = service.connect(user).map_err(Failure::failed)?;
     let talked = terminal::talk(&client, arguments.seed, arguments.task, Some(&history));
     drop(client);

@@ -3,21 +3,38 @@ use std::sync::Arc;
 use super::failure::Failure;
 use crate::ids::UserId;
 use crate::service::{Config, Data, Service, StartError};
+use crate::store::FaultPlan;
 use crate::world::household::Household;
+
+/// What a service of the household is started with.
+pub struct Wanted {
+    pub data: Data,
+    pub recipe_text: String,
+    pub listen: Vec<String>,
+    pub faults: Option<FaultPlan>,
+}
+
+impl Wanted {
+    /// A service for this process alone.
+    pub fn inside(data: Data, recipe_text: String) -> Wanted {
+        Wanted { data, recipe_text, listen: Vec::new(), faults: None }
+    }
+}
 
 /// Starts a service of the household inside this process.
 ///
 /// - errors: with code 2 when what the person named cannot be used (a directory in use, a port
 ///   that is taken), with code 1 when the service itself failed.
-pub fn start(data: Data, recipe_text: String, listen: Vec<String>) -> Result<Service, Failure> {
-    let mut config = Config::new(Arc::new(Household::new()), data);
-    config.recipe_text = recipe_text;
-    config.listen = listen;
+pub fn start(wanted: Wanted) -> Result<Service, Failure> {
+    let mut config = Config::new(Arc::new(Household::new()), wanted.data);
+    config.recipe_text = wanted.recipe_text;
+    config.faults = wanted.faults;
+    config.listen = wanted.listen;
     Service::start(config).map_err(|error| match error {
         StartError::Endpoint(_) | StartError::Store(_) | StartError::Gateway(_) => {
             Failure::bad_input(error)
         }
-        StartError::Actors(_) => Failure::failed(error),
+        StartError::Actors(_) | StartError::Drill(_) => Failure::failed(error),
     })
 }
 

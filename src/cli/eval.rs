@@ -1,5 +1,5 @@
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::failure::Failure;
 use super::recipe;
 use crate::learning::Recipe;
+use crate::study::ablation::{Ablation, Variant, ablate};
 use crate::study::corpus::{BadLine, Corpus};
 use crate::study::goals::goals;
 use crate::study::one_shot::one_shot;
@@ -30,6 +31,8 @@ Examples:
   apprentice eval --corpus utterances.jsonl.gz --protocol primitives
   apprentice eval --corpus utterances.jsonl.gz --protocol one-shot --recipe paper --limit 6
   apprentice eval --corpus goals.jsonl.gz --protocol goals --seed 1 --json
+  apprentice eval --corpus utterances.jsonl.gz --protocol one-shot --lessons 3
+  apprentice eval --corpus utterances.jsonl.gz --ablation tools/ablation.toml --people choosing
 
 docs/evaluation.md describes the corpus, the protocols and every figure.
 
@@ -40,8 +43,12 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     corpus: PathBuf,
     /// What is measured.
-    #[arg(long, value_enum)]
-    protocol: Protocol,
+    #[arg(long, value_enum, required_unless_present = "ablation")]
+    protocol: Option<Protocol>,
+    /// Instead: take back one difference of the recipe at a time, as this file lists them, and show
+    /// what primitives and one-shot lose by it. --limit counts rows; episodes are 24 a seed.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["protocol", "failures", "lessons"])]
+    ablation: Option<PathBuf>,
     /// The recipe that minds are trained with: default, paper, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
@@ -51,6 +58,10 @@ pub struct Arguments {
     /// Rows of each seed, or episodes for one-shot and goals; all rows, or 24 episodes, without it.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=LIMIT_MAX))]
     limit: Option<u64>,
+    /// Sentences of one person that an episode of one-shot or goals teaches.
+    #[arg(long, value_name = "COUNT", default_value_t = 1,
+        value_parser = clap::value_parser!(u64).range(1..=50))]
+    lessons: u64,
     /// Whose sentences: a fixed two thirds to choose settings on, the held-out rest, or all.
     #[arg(long, value_name = "choosing|held-out|all", default_value = "all")]
     people: People,
@@ -79,8 +90,9 @@ enum Protocol {
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
-    let recipe = recipe::load(&arguments.recipe)?;
-    let recipe = Recipe::parse(&recipe).map_err(Failure::bad_input)?;
+    let text = recipe::load(&arguments.recipe)?;
+    let recipe = Recipe::parse(&text).map_err(Failure::bad_input)?;
+    let variants = arguments.ablation.as_deref().map(|path| variants(path, &text)).transpose()?;
     let mut corpus = Corpus::read(&arguments.corpus).map_err(Failure::bad_input)?;
     tell_bad_lines(&corpus.bad, arguments.strict)?;
     let bad_lines = corpus.bad.len();
@@ -99,16 +111,19 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         people,
         threads: arguments.threads as usize,
         progress: &bar,
+        lessons: arguments.lessons as usize,
         failures: arguments.failures,
     };
-    let report = match arguments.protocol {
-        Protocol::Primitives => primitives(&setting, &corpus.steps)
+    let report = match (arguments.protocol, variants) {
+        (_, Some(variants)) => ablate(&setting, &corpus, &variants)
             .map(|report| printed(&report, &arguments, bad_lines)),
-        Protocol::OneShot => {
-            one_shot(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
-        }
-        Protocol::Goals => {
+        (Some(Protocol::Primitives), None) => primitives(&setting, &corpus.steps)
+            .map(|report| printed(&report, &arguments, bad_lines)),
+        (Some(Protocol::Goals), None) => {
             goals(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
+        }
+        (Some(Protocol::OneShot) | None, None) => {
+            one_shot(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
         }
     };
     bar.0.finish_and_clear();
@@ -118,6 +133,15 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     stdout.write_all(report.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {
         Failure::failed(format!("the report cannot be written to standard output: {error}"))
     })
+}
+
+/// The recipes that an ablation compares.
+fn variants(path: &Path, recipe: &str) -> Result<Vec<Variant>, Failure> {
+    let fail = |reason: String| {
+        Failure::bad_input(format!("the ablation {} cannot be used: {reason}", path.display()))
+    };
+    let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
+    Ablation::parse(&text).and_then(|ablation| ablation.variants(recipe)).map_err(fail)
 }
 
 /// A report with what reading the corpus found.
@@ -160,10 +184,10 @@ fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
 /// - errors: a corpus that has nothing for the protocol.
 fn check_rows(arguments: &Arguments, corpus: &Corpus) -> Result<(), Failure> {
     let (needed, found, other) = match arguments.protocol {
-        Protocol::Primitives | Protocol::OneShot => {
+        Some(Protocol::Primitives | Protocol::OneShot) | None => {
             ("sentences for single steps (u)", corpus.steps.len(), corpus.goals.len())
         }
-        Protocol::Goals => {
+        Some(Protocol::Goals) => {
             ("sentences for whole tasks (goal)", corpus.goals.len(), corpus.steps.len())
         }
     };

@@ -1,6 +1,7 @@
 //! The command line: one file per command, and the conversation in a terminal.
 
 mod args;
+mod audit;
 mod check_copy;
 mod converse;
 mod data_dir;
@@ -11,8 +12,11 @@ mod failure;
 mod import;
 mod log;
 mod logging;
+mod past;
 mod recipe;
+mod replay;
 mod salvage;
+mod self_test;
 mod serve;
 mod talk;
 mod terminal;

@@ -1,11 +1,12 @@
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::Args;
 
+use super::embedded::{self, Wanted};
 use super::failure::Failure;
-use super::{data_dir, embedded, recipe};
+use super::{data_dir, recipe};
 use crate::service::Data;
+use crate::store::FaultPlan;
 
 /// Serve people and programs over ZeroMQ.
 #[derive(Debug, Args)]
@@ -13,11 +14,13 @@ use crate::service::Data;
 Examples:
   apprentice serve --data lab --zmq tcp://127.0.0.1:7117
   apprentice serve --data lab --zmq ipc:///run/apprentice.socket --log-format json
+  apprentice serve --data trial --zmq tcp://127.0.0.1:7117 --fault-plan deploy/drills/bad-day.toml
 
 The first line on standard output names the endpoint that was opened (a port 0 takes a free one).
-schema/wire.md describes the wire. Stop it with a signal at any time: what was answered is kept.
+schema/wire.md describes the wire. SIGTERM and SIGINT end it in order; a kill loses nothing that was
+answered either.
 
-Exit codes: 1 the service cannot go on, 2 the directory or the endpoint cannot be used.")]
+Exit codes: 0 it was stopped, 1 the service cannot go on, 2 the directory or the endpoint cannot be used.")]
 pub struct Arguments {
     /// Where everything is kept [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
@@ -29,23 +32,32 @@ pub struct Arguments {
     /// The recipe that new people start with: default, paper, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
+    /// Let appends fail on purpose, by this plan: a drill, never for real participants.
+    #[arg(long, value_name = "FILE")]
+    fault_plan: Option<PathBuf>,
 }
-
-/// How often the service is asked whether it goes on.
-const WATCH: Duration = Duration::from_secs(3600);
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let recipe_text = recipe::load(&arguments.recipe)?;
+    let faults = arguments.fault_plan.as_deref().map(FaultPlan::read).transpose();
+    let faults = faults.map_err(Failure::bad_input)?;
     let directory = data_dir::choose(arguments.data)?;
     eprintln!("apprentice: everything is kept in {}", directory.display());
-    let service = embedded::start(Data::Directory(directory), recipe_text, arguments.zmq)?;
+    if faults.is_some() {
+        eprintln!("apprentice: FAULT DRILL: appends fail on purpose; let no participant in");
+    }
+    let data = Data::Directory(directory);
+    let wanted = Wanted { data, recipe_text, listen: arguments.zmq, faults };
+    let service = embedded::start(wanted)?;
+    ctrlc::set_handler(service.stopper())
+        .map_err(|error| Failure::failed(format!("signals cannot be heard: {error}")))?;
     for endpoint in service.endpoints() {
         println!("serving at {endpoint}");
         tracing::info!(%endpoint, "serving");
     }
-    loop {
-        if let Some(reason) = service.wait_for_failure(WATCH) {
-            return Err(Failure::failed(reason));
-        }
+    if let Some(reason) = service.wait() {
+        return Err(Failure::failed(reason));
     }
+    tracing::info!("stopping");
+    service.stop().map_err(Failure::failed)
 }

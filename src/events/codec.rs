@@ -1,7 +1,10 @@
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use std::io::ErrorKind;
 
-use super::{Event, EventKind};
+use rmp_serde::decode::Error;
+use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::{Deserialize, Serialize};
+
+use super::{Event, EventKind, upcast};
 
 /// Why a record's body is no event this binary can read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -32,11 +35,14 @@ pub fn encode(event: &Event) -> Vec<u8> {
     }
 }
 
+/// Reads every version that was ever released.
+///
 /// - errors: [`DecodeError`]; never panics, whatever the bytes.
 pub fn decode(kind: u16, version: u16, body: &[u8]) -> Result<Event, DecodeError> {
     let kind = EventKind::from_number(kind).ok_or(DecodeError::UnknownKind { kind })?;
     if version != kind.version() {
-        return Err(DecodeError::UnknownVersion { kind, version });
+        return upcast::former(kind, version, body)?
+            .ok_or(DecodeError::UnknownVersion { kind, version });
     }
     Ok(match kind {
         EventKind::SessionOpened => Event::SessionOpened(unpack(kind, body)?),
@@ -57,15 +63,18 @@ fn pack<T: Serialize>(body: &T) -> Vec<u8> {
     rmp_serde::to_vec_named(body).expect("events are plain data and encode into memory")
 }
 
-fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Result<T, DecodeError> {
+pub(super) fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Result<T, DecodeError> {
     let wrong = |reason: String| DecodeError::Body { kind, reason };
-    // `from_read_ref` would keep showing the whole body, read or not.
-    let mut decoder = rmp_serde::Deserializer::new(body);
+    // Of a slice, not of a reader: that copies every text twice.
+    let mut decoder = rmp_serde::Deserializer::from_read_ref(body);
     // A scene file of nested tables must not overflow the stack of whoever reads it.
     decoder.set_max_depth(64);
     let event = T::deserialize(&mut decoder).map_err(|error| wrong(error.to_string()))?;
-    match decoder.get_ref().is_empty() {
-        true => Ok(event),
-        false => Err(wrong("bytes follow after its end".to_owned())),
+    // A slice's decoder does not show what is left; at the end there is no next value to read.
+    match IgnoredAny::deserialize(&mut decoder) {
+        Err(Error::InvalidMarkerRead(error)) if error.kind() == ErrorKind::UnexpectedEof => {
+            Ok(event)
+        }
+        _ => Err(wrong("bytes follow after its end".to_owned())),
     }
 }

@@ -145,6 +145,9 @@ pub struct RetrainCompleted {
     pub recipe: Digest,
     pub mind: Digest,
     pub report: Report,
+    /// What trained it (`learning::code_digest`): tells a mind that this code cannot be expected to
+    /// train again from one that it must. None in records of version 1.
+    pub code: Option<Digest>,
 }
 
 /// The previous mind stays.
@@ -195,7 +198,10 @@ impl EventKind {
 
     /// The version of the body that this binary writes.
     pub fn version(self) -> u16 {
-        1
+        match self {
+            EventKind::RetrainCompleted => 2,
+            _ => 1,
+        }
     }
 
     pub fn from_number(number: u16) -> Option<EventKind> {

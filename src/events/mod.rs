@@ -4,6 +4,7 @@ mod codec;
 mod event;
 mod receipt;
 mod record;
+mod upcast;
 
 pub use codec::{DecodeError, decode, encode};
 pub use event::{

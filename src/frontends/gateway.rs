@@ -10,6 +10,7 @@ use super::{Context, Endpoint};
 use crate::actors::{AnswerTo, ErrorCode, Failure, Front, NotTaken, Response, Submit};
 use crate::ids::{RequestId, TenantId};
 use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX, GATEWAY_IN_FLIGHT_MAX};
+use crate::sabotage;
 
 /// The door: one thread that owns the ROUTER and polls it together with the outbox of the actors.
 #[derive(Debug)]
@@ -245,6 +246,7 @@ impl Door {
     }
 
     fn take(&self, (frames, too_many): (Vec<Vec<u8>>, bool)) {
+        sabotage::point("gateway");
         let counters = &self.counters;
         counters.received.fetch_add(1, Ordering::Relaxed);
         let mut frames = frames.into_iter();

@@ -33,11 +33,6 @@ pub struct Filling {
     pub penalty: f32,
 }
 
-/// Words after which a place is meant, when the thing itself is not named.
-const ONTO: [&str; 3] = ["on", "onto", "to"];
-/// Particles that may stand between a verb and its object.
-const PASSED: [&str; 5] = ["up", "down", "back", "away", "both"];
-
 impl<D: Domain> Arguments<'_, D> {
     /// - returns: `None` when the words leave a slot open.
     pub fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
@@ -58,9 +53,24 @@ impl<D: Domain> Arguments<'_, D> {
             return self.goal(operator);
         }
         let named = self.types.len();
+        let works = !roles.takes(operator) && !roles.is_door(operator);
         for (place, kinds) in self.types.iter().enumerate() {
             let fitting = self.fitting(operator, 0, kinds);
             if !fitting.is_empty() {
+                // "Take the mug to the sink" and "turn to the stove" are ways, not deeds.
+                let way = if roles.takes(operator) { place + 1 } else { place };
+                if (works || roles.takes(operator)) && self.is_way_to(way) {
+                    return None;
+                }
+                // Two things are more than one hand takes.
+                let another = || {
+                    self.types
+                        .get(place + 1)
+                        .is_some_and(|kinds| !self.fitting(operator, 0, kinds).is_empty())
+                };
+                if roles.takes(operator) && self.is_joined(place + 1) && another() {
+                    return None;
+                }
                 return Some(filling(operator, fitting, place as f32));
             }
             if roles.is_door(operator) && self.is_pronoun(place) {
@@ -87,23 +97,28 @@ impl<D: Domain> Arguments<'_, D> {
     /// The first mention that something goes "to", else the first.
     fn goal(&self, operator: &Symbol) -> Option<Filling> {
         let mut order: Vec<(bool, usize)> = Vec::new();
-        let mut before: Vec<&str> = Vec::new();
-        for word in &self.clause.lifted.words {
-            match word {
-                Word::Text(text) => before.push(text),
-                Word::Slot { .. } => {
-                    let directed = before.iter().any(|word| self.lists.toward.contains(*word));
-                    if directed && before.contains(&"where") {
-                        // "Back to where the potato is": the place, not the potato.
-                        return None;
-                    }
-                    order.push((!directed, order.len()));
-                    before.clear();
-                }
+        let mut lost = false;
+        for place in 0..=self.types.len() {
+            let before = self.before(place);
+            lost |= self.unknown_way(&before);
+            if place == self.types.len() {
+                break;
+            }
+            let directed = before.iter().any(|word| self.lists.toward.contains(*word));
+            if directed && before.iter().any(|word| self.lists.wherever.contains(*word)) {
+                // "Back to where the potato is": the place, not the potato.
+                return None;
+            }
+            if !before.last().is_some_and(|word| self.lists.leaving.contains(*word)) {
+                order.push((!directed, place));
             }
         }
         order.sort_unstable();
-        let alone = order.len() == 1;
+        // "To the dishwasher", which nobody knows, is not to what else was named.
+        if lost && order.first().is_some_and(|(aimless, _)| *aimless) {
+            return None;
+        }
+        let alone = self.types.len() == 1;
         order.into_iter().find_map(|(_, place)| {
             let kinds = self.types.get(place)?.iter();
             let kinds: Vec<Symbol> =
@@ -125,7 +140,7 @@ impl<D: Domain> Arguments<'_, D> {
         let mut own = (0..named).find(is_own);
         let mut penalty = 0.0;
         if own.is_none() && !self.names_unknown() {
-            let placed = ONTO.iter().any(|word| says(word))
+            let placed = self.lists.onto.iter().any(|word| says(word))
                 || self.lists.inside.iter().any(|word| says(word));
             match named {
                 0 => return None,
@@ -140,8 +155,19 @@ impl<D: Domain> Arguments<'_, D> {
                 args: vec![held.clone(), place.clone()],
             }],
         };
-        let rest: Vec<usize> = (0..named).filter(|place| Some(*place) != own).collect();
+        // "From the counter" is no place to put it; "next to the cup" is only when nothing else is.
+        let leaves = |place: &usize| {
+            self.before(*place).last().is_some_and(|word| self.lists.leaving.contains(*word))
+        };
+        let mut rest: Vec<usize> =
+            (0..named).filter(|place| Some(*place) != own && !leaves(place)).collect();
+        rest.sort_by_key(|&place| self.is_landmark(place));
         for (skipped, place) in rest.iter().enumerate() {
+            // Next to the cup is where the robot stands rather than in the cup.
+            let stands = !self.fitting(operator, 1, self.here.as_slice()).is_empty();
+            if stands && self.is_landmark(*place) {
+                continue;
+            }
             let kinds = match self.is_pronoun(*place) {
                 true => self.here.as_slice(),
                 false => self.types[*place].as_slice(),
@@ -234,6 +260,69 @@ impl<D: Domain> Arguments<'_, D> {
         self.said(place).is_some_and(|mention| mention.pronoun)
     }
 
+    /// The words between the mention before a place and the one at it, without determiners, and
+    /// without adjectives right before it; for the place behind the last mention, those to the end.
+    fn before(&self, place: usize) -> Vec<&str> {
+        let adjectives = &self.domain.lexicon().adjectives;
+        let mut slot = 0;
+        let mut found = Vec::new();
+        for word in &self.clause.lifted.words {
+            match word {
+                Word::Slot { .. } => slot += 1,
+                Word::Text(text) if slot == place => found.push(text.as_str()),
+                Word::Text(_) => {}
+            }
+        }
+        found.retain(|word| !self.lists.determiners.contains(*word));
+        while found.last().is_some_and(|word| adjectives.iter().any(|a| a == word)) {
+            found.pop();
+        }
+        found
+    }
+
+    /// Whether a mention is named as where a way ends: "to the sink", "back to the sink".
+    fn is_way_to(&self, place: usize) -> bool {
+        let before = self.before(place);
+        let Some((last, rest)) = before.split_last() else { return false };
+        let passed = |word: &&str| {
+            self.lists.passed.contains(*word) || self.lists.verb_particles.contains(*word)
+        };
+        // Before the first mention stands the verb.
+        let rest = if place == 0 { rest.get(1..).unwrap_or(&[]) } else { rest };
+        place < self.types.len()
+            && self.lists.destination.contains(*last)
+            && rest.iter().all(passed)
+    }
+
+    /// Whether the words say where to, and name nothing that is known: "to the dishwasher".
+    fn unknown_way(&self, words: &[&str]) -> bool {
+        let aside = |word: &str| {
+            self.lists.stop.contains(word)
+                || self.lists.adverbs.contains(word)
+                || self.lists.toward.contains(word)
+                || self.lists.verbs.contains(word)
+                || self.lists.noun_verbs.contains(word)
+        };
+        words.windows(2).any(|two| self.lists.destination.contains(two[0]) && !aside(two[1]))
+    }
+
+    /// Whether a mention follows another of the same part: "the cup and the knife".
+    fn is_joined(&self, place: usize) -> bool {
+        matches!(self.before(place)[..], [word] if self.lists.cuts.contains(word))
+    }
+
+    /// Whether a mention only helps to find a place: "next to the cup", "between the cup and the
+    /// knife".
+    fn is_landmark(&self, place: usize) -> bool {
+        if place > 0 && self.is_joined(place) && self.is_landmark(place - 1) {
+            return true;
+        }
+        let before = self.before(place).join(" ");
+        self.lists.landmarks.iter().any(|phrase| {
+            before.strip_suffix(phrase.as_str()).is_some_and(|b| b.is_empty() || b.ends_with(' '))
+        })
+    }
+
     /// Whether words that name nothing known stand between the verb and the first preposition.
     fn names_unknown(&self) -> bool {
         let adjectives = &self.domain.lexicon().adjectives;
@@ -245,7 +334,7 @@ impl<D: Domain> Arguments<'_, D> {
             Word::Text(text) => {
                 !self.lists.determiners.contains(text)
                     && !grammar.is_adjective(text)
-                    && !PASSED.contains(&text.as_str())
+                    && !self.lists.passed.contains(text)
             }
         });
         matches!(first, Some(Word::Text(text)) if !self.lists.stop.contains(text))

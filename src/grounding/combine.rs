@@ -3,7 +3,7 @@ use super::moment::Moment;
 use super::resolver::resolve;
 use super::settings::Execution;
 use crate::language::{
-    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Roles, Step, Symbol,
+    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Roles, Step, Symbol, Word,
     WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
@@ -111,10 +111,17 @@ fn extend<D: Domain>(
         if whole.program.steps.is_empty() {
             return;
         }
-        if ground.context.lists.is_some() && partial.literal && undoes_itself(roles, &whole.program)
-        {
-            let reason = "it would be taken again from where it was put, so it was put there for \
-                          something that is not known";
+        let lists = ground.context.lists.is_some();
+        let purposes = ground.context.execution.purposes;
+        let reason = match lists && partial.literal {
+            true if undoes_itself(roles, &whole.program) => Some(
+                "it would be taken again from where it was put, so it was put there for \
+                 something that is not known",
+            ),
+            true if purposes => beyond_steps(roles, &whole),
+            _ => None,
+        };
+        if let Some(reason) = reason {
             whole.verdict = Verdict::Unfilled { reason: reason.to_owned() };
         }
         done.push(whole);
@@ -142,7 +149,10 @@ impl<D: Domain> Ground<'_, D> {
         let referents = resolve(domain, &partial.scene, &offer.clause.mentions, before);
         let held = domain.held(&partial.scene);
         let mentioned = referents.last.clone();
-        if let (true, Some(lists)) = (offer.open, self.context.lists) {
+        // "Put the plate in it": what is in the hand goes in something else, whatever "it" means.
+        let mentions = &offer.clause.mentions;
+        let pronoun = offer.seed && mentions.len() > 1 && mentions.iter().any(|m| m.pronoun);
+        if let (true, Some(lists)) = (offer.open || pronoun, self.context.lists) {
             let arguments = Arguments {
                 domain,
                 lists,
@@ -195,6 +205,12 @@ impl<D: Domain> Ground<'_, D> {
             }
             return self.try_filled(partial, offer, filled, mentioned);
         };
+        let unlike = |ground: &Program| self.unlike(&partial.scene, offer.clause, ground);
+        if let (true, Some(word)) = (offer.seed, filling.programs.first().and_then(unlike)) {
+            let mut filled = program(Program { steps: Vec::new() });
+            filled.missing = Some(Missing::Slot { reason: format!("nothing of it is {word}") });
+            return self.try_filled(partial, offer, filled, mentioned);
+        }
         let further = Offer { distance: further(offer.distance, filling.penalty), ..offer.clone() };
         let mut first = None;
         for ground in filling.programs.into_iter().take(TYPE_CHOICES_MAX) {
@@ -209,6 +225,30 @@ impl<D: Domain> Ground<'_, D> {
             first.get_or_insert(next);
         }
         first.expect("a filling has at least one program")
+    }
+
+    /// A word before a mention of something in the program that is true of nothing of its type.
+    fn unlike<'c>(
+        &self,
+        scene: &D::Scene,
+        clause: &'c Clause,
+        program: &Program,
+    ) -> Option<&'c String> {
+        let words = &clause.lifted.words;
+        let slots = (0..words.len()).filter(|&at| matches!(words[at], Word::Slot { .. }));
+        let described = slots.zip(&clause.mentions).filter_map(|(at, mention)| {
+            let before = at.checked_sub(1).and_then(|before| words.get(before))?;
+            let Word::Text(word) = before else { return None };
+            Some((word, mention))
+        });
+        let used = |kind: &Symbol| program.steps.iter().any(|step| step.args.contains(kind));
+        described
+            .filter(|(word, mention)| {
+                let mut kinds = mention.types.iter().filter(|kind| used(kind));
+                kinds.any(|kind| self.moment.domain.unlike(scene, kind, word))
+            })
+            .map(|(word, _)| word)
+            .next()
     }
 
     fn try_filled(
@@ -362,6 +402,39 @@ fn undoes_itself(roles: &Roles, program: &Program) -> bool {
         }
     }
     false
+}
+
+/// Why several primitives in one utterance are a means to something that nobody named, if they are.
+///
+/// Whoever puts a thing somewhere and then turns something on, or works the same thing twice,
+/// wants what that does to the thing; the steps alone may stop half way. And several things to do
+/// that cannot be done as said were probably not meant as said.
+fn beyond_steps(roles: &Roles, whole: &Candidate) -> Option<&'static str> {
+    let steps = &whole.program.steps;
+    let works = |step: &&Step| {
+        let operator = &step.operator;
+        !roles.goes(operator)
+            && !roles.takes(operator)
+            && !roles.puts(operator)
+            && !roles.is_door(operator)
+    };
+    let put = steps.iter().position(|step| roles.puts(&step.operator));
+    let put_then_worked = put.is_some_and(|put| steps[put..].iter().any(|step| works(&step)));
+    let again = |place: usize, step: &Step| {
+        steps[..place].iter().any(|before| before.args == step.args && works(&before))
+    };
+    let worked_twice = steps.iter().enumerate().any(|(at, step)| works(&step) && again(at, step));
+    if put_then_worked || worked_twice {
+        return Some("what all of that together is for is not known");
+    }
+    let acts = steps.iter().filter(|step| !roles.goes(&step.operator)).count();
+    let handled = steps
+        .iter()
+        .filter(|step| !roles.goes(&step.operator) && !roles.is_door(&step.operator))
+        .count();
+    let forbidden = matches!(whole.verdict, Verdict::Forbidden { .. });
+    let several = whole.lifted.len() > 1 && (handled > 1 || acts > 2);
+    (forbidden && several).then_some("all of that together cannot be done as it was said")
 }
 
 /// Steps taken unasked before one step that needs them.

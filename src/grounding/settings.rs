@@ -45,4 +45,8 @@ pub struct Execution {
     /// When a step fails only for want of another that the world itself names (going there
     /// first), do that one before it.
     pub approach: bool,
+    /// Decline several primitives in one utterance that only make sense as a means to something
+    /// that nobody named: put something somewhere and then turn something on.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub purposes: bool,
 }

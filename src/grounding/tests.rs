@@ -14,7 +14,7 @@ fn plain() -> (Abstraction, Execution) {
         split: Split::And,
         lists: None,
     };
-    (abstraction, Execution { polarity: false, approach: false })
+    (abstraction, Execution { polarity: false, approach: false, purposes: false })
 }
 
 /// As in the recipe `default`, and fixtures.
@@ -28,7 +28,7 @@ fn rich() -> (Abstraction, Execution) {
         split: Split::Clauses,
         lists: None,
     };
-    (abstraction, Execution { polarity: true, approach: true })
+    (abstraction, Execution { polarity: true, approach: true, purposes: false })
 }
 
 fn known(word: &str) -> bool {

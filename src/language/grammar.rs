@@ -111,8 +111,9 @@ impl Grammar<'_> {
             matches!(after, Some(Word::Text(next)) if lists.determiners.contains(next));
         let named = matches!(after, Some(Word::Slot { .. }));
         if lists.noun_verbs.contains(word) {
-            let away = |next: &str| matches!(next, "up" | "back" | "down" | "off");
-            return named || determined || matches!(after, Some(Word::Text(next)) if away(next));
+            let goes_on =
+                matches!(after, Some(Word::Text(next)) if lists.carrying_on.contains(next));
+            return named || determined || goes_on;
         }
         if lists.verbs.contains(word) || (word.ends_with("ing") && word.len() > 5) {
             return true;

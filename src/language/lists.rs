@@ -31,6 +31,56 @@ pub struct WordLists {
     /// Verbs of moving that need no goal: "turn around".
     pub moving: BTreeSet<String>,
     pub verbs: BTreeSet<String>,
+    /// Before a verb: what follows is what the rest is for ("to chill").
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub purposes: BTreeSet<String>,
+    /// How long, how often, until when: no single step takes a time.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub lasting: BTreeSet<String>,
+    /// Before a mention: where a way ends ("take the mug TO the sink"), and where it begins.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub destination: BTreeSet<String>,
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub leaving: BTreeSet<String>,
+    /// What follows says where a place is, not which: "where the lamp is".
+    #[serde(default = "release_0_1::wherever", skip_serializing_if = "release_0_1::is_wherever")]
+    pub wherever: BTreeSet<String>,
+    /// Before a place that something is put on, and particles that may stand between a verb and its
+    /// object.
+    #[serde(default = "release_0_1::onto", skip_serializing_if = "release_0_1::is_onto")]
+    pub onto: BTreeSet<String>,
+    #[serde(default = "release_0_1::passed", skip_serializing_if = "release_0_1::is_passed")]
+    pub passed: BTreeSet<String>,
+    /// Words, determiners aside, that make the mention behind them a landmark: "next to".
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub landmarks: BTreeSet<String>,
+    /// After a noun that is a verb too: it is a verb ("clean up").
+    #[serde(
+        default = "release_0_1::carrying_on",
+        skip_serializing_if = "release_0_1::is_carrying_on"
+    )]
+    pub carrying_on: BTreeSet<String>,
+}
+
+/// Lists that release 0.1 had in its code. A recipe that was recorded by it has none of them, and
+/// must keep its meaning and its digest.
+mod release_0_1 {
+    use std::collections::BTreeSet;
+
+    macro_rules! list {
+        ($name:ident, $is:ident, $words:expr) => {
+            pub fn $name() -> BTreeSet<String> {
+                $words.map(str::to_owned).into()
+            }
+            pub fn $is(list: &BTreeSet<String>) -> bool {
+                *list == $name()
+            }
+        };
+    }
+    list!(wherever, is_wherever, ["where"]);
+    list!(onto, is_onto, ["on", "onto", "to"]);
+    list!(passed, is_passed, ["up", "down", "back", "away", "both"]);
+    list!(carrying_on, is_carrying_on, ["up", "back", "down", "off"]);
 }
 
 impl WordLists {

@@ -1,6 +1,7 @@
 //! The pure function from a recipe and an ordered list of lessons to a mind.
 
 mod bundle;
+mod code;
 mod error;
 mod history;
 mod lesson;
@@ -12,6 +13,7 @@ pub mod recipe;
 mod tests;
 mod train;
 
+pub use code::{code_digest, mind_schema, pinned};
 pub use error::TrainError;
 pub use lesson::Lesson;
 pub use lift::lift;

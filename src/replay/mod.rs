@@ -1,8 +1,18 @@
 //! Reading the past: a session from its records. Waking a sleeping user, recovery after a crash
-//! and reading history are all [`rebuild`].
+//! and reading history are all [`rebuild`]; [`audit`] holds the whole log against what this binary
+//! computes.
 
+mod audit;
+mod auditor;
+mod difference;
 mod minds;
+mod origins;
 mod rebuild;
+mod repropose;
 
-pub use minds::Minds;
+pub use audit::{AuditReport, Counts, Progress, Scrutiny, StreamReport, audit, streams_of};
+pub use difference::{Difference, body};
+pub use minds::{Minds, Work};
+pub use origins::{keep_mind, mind_origin, state_origin};
 pub use rebuild::{RebuildError, keep_snapshot, mind_of, rebuild, rebuild_at};
+pub use repropose::command_of;

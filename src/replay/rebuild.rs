@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
-use super::Minds;
-use crate::events::EventKind;
+use super::{Minds, origins};
+use crate::events::Head;
 use crate::ids::{Digest, Seq, StreamId};
-use crate::learning::{self, Mind};
+use crate::learning::{self, Mind, Recipe, RecipeError};
 use crate::session::{Divergence, Session, State};
-use crate::store::{ReadError, Store};
+use crate::store::{Found, ReadError, Store};
 use crate::world::Domain;
 
 /// Why a session cannot be rebuilt.
@@ -15,6 +15,11 @@ pub enum RebuildError {
     Read { stream: StreamId, error: ReadError },
     #[error("stream {stream}: {error}; was it recorded by another version of apprentice?")]
     Divergence { stream: StreamId, error: Divergence },
+    #[error(
+        "stream {stream}: the recipe that it was recorded with cannot be read: {error}; \
+         use a newer version of apprentice"
+    )]
+    Recipe { stream: StreamId, error: RecipeError },
     #[error("stream {stream}: the mind of its records has digest {recorded}, but {recomputed}")]
     Mind { stream: StreamId, recorded: Digest, recomputed: String },
     #[error("stream {stream} has {have} records; there is no record {wanted}")]
@@ -34,8 +39,10 @@ pub fn rebuild<D: Domain>(
         Some(session) => session,
         None => Session::new(domain.clone()),
     };
-    let next = session.head().next();
-    fold(&mut session, store, stream, next, None)?;
+    let snapshot = session.head();
+    let folded = fold(&mut session, store, stream, snapshot.next(), None)?;
+    minds.note_rebuild(folded);
+    tracing::debug!(%stream, snapshot = snapshot.seq, folded, "a session was rebuilt");
     equip(&mut session, store, stream, minds)?;
     Ok(session)
 }
@@ -51,7 +58,8 @@ pub fn rebuild_at<D: Domain>(
     at: Seq,
 ) -> Result<Session<D>, RebuildError> {
     let mut session = Session::new(domain.clone());
-    fold(&mut session, store, stream, Seq::FIRST, Some(at))?;
+    let folded = fold(&mut session, store, stream, Seq::FIRST, Some(at))?;
+    minds.note_rebuild(folded);
     if session.head().seq != at.get() {
         let (have, wanted) = (session.head().seq, at.get());
         return Err(RebuildError::PastHead { stream: stream.clone(), have, wanted });
@@ -60,13 +68,15 @@ pub fn rebuild_at<D: Domain>(
     Ok(session)
 }
 
+/// Returns how many records were applied.
 fn fold<D: Domain>(
     session: &mut Session<D>,
     store: &Store,
     stream: &StreamId,
     from: Seq,
     until: Option<Seq>,
-) -> Result<(), RebuildError> {
+) -> Result<u64, RebuildError> {
+    let mut folded = 0;
     let read = |error| RebuildError::Read { stream: stream.clone(), error };
     for record in store.log.read(stream, from).map_err(read)? {
         let record = record.map_err(read)?;
@@ -76,8 +86,9 @@ fn fold<D: Domain>(
         session
             .apply(&record)
             .map_err(|error| RebuildError::Divergence { stream: stream.clone(), error })?;
+        folded += 1;
     }
-    Ok(())
+    Ok(folded)
 }
 
 /// The latest snapshot, if it fits this binary and the log still has the record it was taken at.
@@ -86,23 +97,31 @@ fn resume<D: Domain>(
     store: &Store,
     stream: &StreamId,
 ) -> Result<Option<Session<D>>, ReadError> {
-    let version = snapshot_version(&**domain);
-    let latest = store.snapshots.latest::<State<D::Scene, D::Task>>(stream, version);
-    let Some((head, state)) = latest else { return Ok(None) };
-    let Some(at) = Seq::new(head.seq) else { return Ok(None) };
-    // A log restored from a backup may be shorter than the snapshot, or have another tail.
-    let stands = match store.log.read(stream, at)?.next() {
-        Some(record) => record?.digest == head.digest,
-        None => false,
+    let origin = origins::state_origin(&**domain, Digest::ZERO);
+    let mut unreadable = None;
+    let resume = |head: Head, recipe: Digest, state: State<D::Scene, D::Task>| {
+        let stands = still_there(store, stream, head).unwrap_or_else(|error| {
+            unreadable = Some(error);
+            false
+        });
+        let fits = stands && state.head.seq == head.seq && state.opened.is_some();
+        let session = fits.then(|| Session::resume(domain.clone(), state))?;
+        (session.recipe().digest() == recipe).then_some(session)
     };
-    if !stands || state.head.seq != head.seq {
-        tracing::info!(%stream, seq = head.seq, "a snapshot does not fit the log and is not used");
-        return Ok(None);
-    }
-    Ok(Some(Session::resume(domain.clone(), state)))
+    let resumed = store.snapshots.latest(stream, origin.schema, origin.code, resume);
+    unreadable.map_or(Ok(resumed), Err)
 }
 
-/// Keeps a snapshot, so that the next rebuild folds less.
+/// Whether the log has the record that a snapshot was taken at: one restored from a backup may be
+/// shorter, or have another tail.
+fn still_there(store: &Store, stream: &StreamId, head: Head) -> Result<bool, ReadError> {
+    let Some(at) = Seq::new(head.seq) else { return Ok(false) };
+    let record = store.log.read(stream, at)?.next().transpose()?;
+    Ok(record.is_some_and(|record| record.digest == head.digest))
+}
+
+/// Keeps a snapshot, so that the next rebuild folds less. Before the session is open there is
+/// nothing to keep.
 ///
 /// - errors: a sentence for the operator; failing costs time only.
 pub fn keep_snapshot<D: Domain>(
@@ -110,23 +129,11 @@ pub fn keep_snapshot<D: Domain>(
     stream: &StreamId,
     session: &Session<D>,
 ) -> Result<(), String> {
-    let version = snapshot_version(&**session.domain());
-    store.snapshots.put(stream, session.head(), version, session.state())
-}
-
-/// Names the shape and the meaning of a state: another crate version, body version or world makes
-/// old snapshots absent.
-fn snapshot_version<D: Domain>(domain: &D) -> Digest {
-    let bodies: Vec<String> =
-        EventKind::ALL.iter().map(|kind| kind.version().to_string()).collect();
-    let text = format!(
-        "apprentice {} · bodies {} · {} {}",
-        env!("CARGO_PKG_VERSION"),
-        bodies.join(","),
-        domain.id(),
-        domain.version(),
-    );
-    Digest::of(text.as_bytes())
+    if !session.is_open() {
+        return Ok(());
+    }
+    let origin = origins::state_origin(&**session.domain(), session.recipe().digest());
+    store.snapshots.put(stream, &origin, session.head(), session.state())
 }
 
 /// Installs the mind that the session's state names, if any.
@@ -136,15 +143,26 @@ fn equip<D: Domain>(
     stream: &StreamId,
     minds: &Minds,
 ) -> Result<(), RebuildError> {
+    if let Some(opened) = &session.state().opened
+        && !session.knows_its_recipe()
+        && let Err(error) = Recipe::parse(&opened.recipe_text)
+    {
+        return Err(RebuildError::Recipe { stream: stream.clone(), error });
+    }
     if session.mind_wanted().is_some() {
         session.install(mind_of(session, store, stream, minds)?);
     }
     Ok(())
 }
 
-/// The mind that the state names: from memory, from its cached bytes, or trained again.
+/// The mind that the state names: from memory, from its kept bytes, or trained again.
 ///
-/// - errors: [`RebuildError::Mind`] when training gives another digest (invariant `ModelAgrees`).
+/// Kept bytes of other code are not taken at their word but trained again. Should this code train
+/// them differently they are used after all: they are what the log names. (Counted in
+/// [`Minds::work`].)
+///
+/// - errors: [`RebuildError::Mind`] when training gives another digest and no bytes were kept
+///   (invariant `ModelAgrees`).
 /// - panics: before the session was opened.
 pub fn mind_of<D: Domain>(
     session: &Session<D>,
@@ -157,22 +175,35 @@ pub fn mind_of<D: Domain>(
         return Ok(mind);
     }
     let (domain, recipe) = (&**session.domain(), session.recipe());
-    let cached = store.models.load(stream, recorded);
-    let cached = cached.and_then(|bytes| Mind::from_bytes(domain, recipe, &bytes).ok());
-    let mind = match cached {
-        Some(mind) => mind,
-        None => {
-            let disagree =
-                |recomputed| RebuildError::Mind { stream: stream.clone(), recorded, recomputed };
-            let trained = learning::train(domain, recipe, &session.trained_lessons())
-                .map_err(|error| disagree(error.to_string()))?;
-            if trained.digest() != recorded {
-                return Err(disagree(format!("training gives {}", trained.digest())));
-            }
-            if let Err(reason) = store.models.put(stream, recorded, &trained.to_bytes()) {
+    let origin = origins::mind_origin(recipe.digest());
+    let read = |bytes: &[u8]| Mind::from_bytes(domain, recipe, bytes).ok();
+    let mind = match store.models.load(stream, &origin, recorded, read) {
+        Found::Fits(mind) => mind,
+        found => {
+            minds.note_training();
+            let trained = learning::train(domain, recipe, &session.trained_lessons());
+            let mind = match (trained, found) {
+                (Ok(trained), _) if trained.digest() == recorded => trained,
+                (trained, Found::Stale(kept)) => {
+                    minds.note_not_reproduced();
+                    let trained = trained.map(|mind| mind.digest().to_hex());
+                    let trained = trained.unwrap_or_else(|error| error.to_string());
+                    tracing::warn!(%stream, %recorded, %trained, "a mind of other code is kept");
+                    kept
+                }
+                (trained, _) => {
+                    let recomputed = match trained {
+                        Ok(trained) => format!("training gives {}", trained.digest()),
+                        Err(error) => error.to_string(),
+                    };
+                    let stream = stream.clone();
+                    return Err(RebuildError::Mind { stream, recorded, recomputed });
+                }
+            };
+            if let Err(reason) = origins::keep_mind(store, stream, &mind) {
                 tracing::warn!(%stream, %reason, "the mind's bytes were not kept");
             }
-            trained
+            mind
         }
     };
     let mind = Arc::new(mind);

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use crate::actors::{ActorsError, Failure, House, HouseSettings};
+use crate::actors::{ActorsError, Failure, House, HouseSettings, Wakings};
 use crate::frontends::{
     Client, ClientError, Context, Counts, Endpoint, EndpointError, Gateway, GatewayError,
 };
 use crate::ids::{TenantId, UserId};
 use crate::learning::Recipe;
 use crate::limits::AWAKE_USERS_MAX;
-use crate::store;
+use crate::store::{self, FaultPlan};
 use crate::world::Domain;
 
 /// What a service is made of.
@@ -30,6 +30,8 @@ pub struct Config<D: Domain> {
     pub trainers: usize,
     /// People awake at once.
     pub awake_max: usize,
+    /// Faults on purpose, for drills; none in a normal service.
+    pub faults: Option<FaultPlan>,
 }
 
 /// Where a service keeps what it records.
@@ -47,6 +49,8 @@ pub enum StartError {
     Endpoint(#[from] EndpointError),
     #[error(transparent)]
     Store(#[from] store::OpenError),
+    #[error("the fault drill cannot be started: {0}")]
+    Drill(std::io::Error),
     #[error(transparent)]
     Actors(#[from] ActorsError),
     #[error(transparent)]
@@ -76,6 +80,7 @@ impl<D: Domain> Config<D> {
             listen: Vec::new(),
             trainers: cores(),
             awake_max: AWAKE_USERS_MAX,
+            faults: None,
         }
     }
 }
@@ -94,6 +99,10 @@ impl Service {
         let store = match &config.data {
             Data::Directory(path) => store::open(path)?,
             Data::Memory => store::open_memory(),
+        };
+        let store = match config.faults {
+            Some(plan) => store.under(plan).map_err(StartError::Drill)?,
+            None => store,
         };
         let house = House::start(HouseSettings {
             domain: config.domain,
@@ -134,15 +143,29 @@ impl Service {
         self.house.awake()
     }
 
+    /// What waking people has cost, and how often a kept mind or snapshot was stale or damaged.
+    pub fn wakings(&self) -> Wakings {
+        self.house.wakings()
+    }
+
     /// Why the service cannot go on, if so: it then answers nobody, and whoever started it must
     /// end the process with a code that is not 0.
     pub fn failed(&self) -> Option<String> {
         self.failure.reason()
     }
 
-    /// Blocks until the service failed or `limit` has passed.
-    pub fn wait_for_failure(&self, limit: Duration) -> Option<String> {
-        self.failure.wait(limit);
+    /// Asks for the end of [`Service::wait`], from another thread or a signal handler.
+    pub fn stopper(&self) -> impl Fn() + Send + Sync + use<> {
+        let failure = self.failure.clone();
+        move || failure.stop_expected()
+    }
+
+    /// Blocks until the service failed or a [`Service::stopper`] was called.
+    ///
+    /// - returns: why it failed, if it did.
+    pub fn wait(&self) -> Option<String> {
+        const WATCH: Duration = Duration::from_secs(3600);
+        while !self.failure.wait(WATCH) {}
         self.failed()
     }
 

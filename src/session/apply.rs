@@ -7,11 +7,11 @@ use std::sync::Arc;
 use super::Phase;
 use super::state::{Action, Episode, LiveLesson, Opened, State, Training, Unexplained};
 use crate::events::{
-    DecompositionTaught, EpisodeStarted, Event, Head, Interpreted, Record, RetrainCompleted,
-    SessionOpened,
+    DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, Head, Interpreted, Record,
+    RetrainCompleted, SessionOpened,
 };
 use crate::ids::Seq;
-use crate::language::Outcome;
+use crate::language::{Outcome, Program};
 use crate::learning::Lesson;
 use crate::world::Domain;
 
@@ -36,13 +36,15 @@ pub fn apply<D: Domain>(
     let seq = record.seq;
     agree(seq, "sequence number", seq.get(), state.head.seq + 1)?;
     agree(seq, "predecessor", record.prev, state.head.digest)?;
+    let opens = matches!(record.event, Event::SessionOpened(_));
+    if opens == state.opened.is_some() {
+        return Err(outside(seq, "an open session"));
+    }
     match &record.event {
         Event::SessionOpened(event) => open(domain, state, seq, event)?,
         Event::EpisodeStarted(event) => start(domain, state, seq, event)?,
         Event::Interpreted(event) => interpret(domain, state, seq, event)?,
-        Event::EpisodeEnded(event) => {
-            state.phase = if event.to_teach.is_empty() { Phase::Idle } else { Phase::Teaching };
-        }
+        Event::EpisodeEnded(event) => end(state, seq, event)?,
         Event::DecompositionTaught(event) => teach(state, seq, event)?,
         Event::DecompositionDeclined(event) => {
             unexplained(state, seq, event.explains)?.settled = true;
@@ -165,6 +167,16 @@ fn interpret<D: Domain>(
     agree(seq, "scene digest", event.scene_after, domain.digest(&episode.scene))
 }
 
+fn end<S, T>(state: &mut State<S, T>, seq: Seq, event: &EpisodeEnded) -> Result<(), Divergence> {
+    let episode = state.episode.as_ref().ok_or_else(|| outside(seq, "an episode"))?;
+    let unexplained: Vec<Seq> = episode.unexplained.iter().map(|said| said.seq).collect();
+    agree(seq, "utterances", event.utterances, episode.utterances)?;
+    agree(seq, "actions", event.actions as usize, episode.actions.len())?;
+    agree(seq, "utterances to teach", seqs(&event.to_teach), seqs(&unexplained))?;
+    state.phase = if event.to_teach.is_empty() { Phase::Idle } else { Phase::Teaching };
+    Ok(())
+}
+
 fn teach<S, T>(
     state: &mut State<S, T>,
     seq: Seq,
@@ -174,6 +186,12 @@ fn teach<S, T>(
     said.settled = true;
     let (scene, mentioned) = (said.scene.clone(), said.mentioned.clone());
     let episode = state.episode.as_ref().ok_or_else(|| outside(seq, "an episode"))?;
+    let run = (event.first as usize).saturating_sub(1)..event.last as usize;
+    let done = episode.actions.get(run).unwrap_or_default().iter().map(|action| &action.step);
+    if !event.program.steps.iter().eq(done.clone()) {
+        let done = Program { steps: done.cloned().collect() };
+        return agree(seq, "taught program", event.program.to_string(), done.to_string());
+    }
     let lesson = Lesson {
         utterance: event.utterance.clone(),
         program: event.program.clone(),

@@ -281,6 +281,7 @@ fn finish_retrain<D: Domain>(
             recipe,
             mind: *mind,
             report: report.clone(),
+            code: Some(learning::code_digest()),
         }),
         Err(reason) => Event::RetrainFailed(RetrainFailed { recipe, reason: reason.clone() }),
     }])

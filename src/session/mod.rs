@@ -172,7 +172,14 @@ impl<D: Domain> Session<D> {
         Timestamp(wall.0.max(self.state.last_at.0 + 1))
     }
 
-    /// - panics: before the session was opened.
+    /// Whether the recorded recipe is one that this binary can read; a newer one may have written
+    /// it. A session without its recipe can be looked at, and decides nothing.
+    pub fn knows_its_recipe(&self) -> bool {
+        self.recipe.is_some()
+    }
+
+    /// - panics: before the session was opened, and when it does not [know its
+    ///   recipe](Session::knows_its_recipe).
     pub fn recipe(&self) -> &Arc<Recipe> {
         self.recipe.as_ref().expect("SessionOpened carries the recipe and is the first record")
     }

@@ -214,7 +214,9 @@ fn streams_are_listed_by_tenant(subject: Subject) {
     ones.sort();
     assert_eq!(log.streams(&ada.tenant), Ok(ones));
     assert_eq!(log.streams(&twin.tenant), Ok(vec![twin.clone()]));
+    assert_eq!(log.tenants(), Ok(vec![ada.tenant.clone(), twin.tenant.clone()]));
     assert_eq!(log.head(&twin), Ok(head));
+    assert_eq!(log.walk(&twin), Ok(head));
     assert_eq!(reasons(&read_all(&*log, &twin)), ["c"]);
     assert_eq!(reasons(&read_all(&*log, &ada)), ["a", "b"]);
 }

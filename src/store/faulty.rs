@@ -1,12 +1,15 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use serde::Deserialize;
+
 use super::log::{AppendError, EventLog, Pending, Promise, ReadError};
 use super::{Entropy, SeededEntropy};
 use crate::events::{Batch, Head, Record};
 use crate::ids::{Seq, StreamId, TenantId};
 
 /// What goes wrong with one append.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Fault {
     None,
     /// Refused as busy; nothing is appended.
@@ -24,7 +27,8 @@ pub enum Fault {
 }
 
 /// Which appends go wrong. Shares are out of 1,000 and drawn from the seed; `script` comes first.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct FaultPlan {
     pub seed: u64,
     /// The faults of the first appends, one each.
@@ -35,6 +39,43 @@ pub struct FaultPlan {
     pub held_appends: u32,
     pub crashes_before: u32,
     pub crashes_after: u32,
+    /// Milliseconds after which a drill lets go what is held back.
+    pub release_every_ms: u64,
+}
+
+impl Default for FaultPlan {
+    /// No faults.
+    fn default() -> FaultPlan {
+        FaultPlan {
+            seed: 0,
+            script: Vec::new(),
+            refused: 0,
+            unacknowledged: 0,
+            held_answers: 0,
+            held_appends: 0,
+            crashes_before: 0,
+            crashes_after: 0,
+            release_every_ms: 100,
+        }
+    }
+}
+
+impl FaultPlan {
+    /// Appends of 1,000 that go wrong.
+    pub(super) fn shares(&self) -> u64 {
+        self.table().iter().map(|(share, _)| u64::from(*share)).sum()
+    }
+
+    fn table(&self) -> [(u32, Fault); 6] {
+        [
+            (self.refused, Fault::Refused),
+            (self.unacknowledged, Fault::Unacknowledged),
+            (self.held_answers, Fault::HeldAnswer),
+            (self.held_appends, Fault::HeldAppend),
+            (self.crashes_before, Fault::CrashBefore),
+            (self.crashes_after, Fault::CrashAfter),
+        ]
+    }
 }
 
 /// A log on which appends go wrong by a plan. For simulations, and for fault drills of a lab.
@@ -113,16 +154,7 @@ impl FaultyLog {
         let mut bytes = [0; 8];
         self.dice.fill(&mut bytes);
         let mut roll = u64::from_be_bytes(bytes) % 1_000;
-        let plan = &self.plan;
-        let shares = [
-            (plan.refused, Fault::Refused),
-            (plan.unacknowledged, Fault::Unacknowledged),
-            (plan.held_answers, Fault::HeldAnswer),
-            (plan.held_appends, Fault::HeldAppend),
-            (plan.crashes_before, Fault::CrashBefore),
-            (plan.crashes_after, Fault::CrashAfter),
-        ];
-        for (share, fault) in shares {
+        for (share, fault) in self.plan.table() {
             if roll < u64::from(share) {
                 return fault;
             }
@@ -194,6 +226,16 @@ impl EventLog for FaultyLog {
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         self.alive()?;
         self.inner.streams(tenant)
+    }
+
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
+        self.alive()?;
+        self.inner.tenants()
+    }
+
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        self.alive()?;
+        self.inner.walk(stream)
     }
 }
 

@@ -27,6 +27,15 @@ pub trait EventLog: Send + Sync {
 
     /// The streams of a tenant that have at least one record, in the order of their keys.
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError>;
+
+    /// The tenants that have at least one stream, in the order of their names.
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError>;
+
+    /// Walks a stream without opening a body: checksums, dense sequence, chain. What is left to
+    /// check of a person who was erased.
+    ///
+    /// - returns: the last record.
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError>;
 }
 
 /// The end of a promise that keeps it.

@@ -101,4 +101,19 @@ impl EventLog for MemoryLog {
         let keys = streams.get(tenant).into_iter().flat_map(BTreeMap::keys);
         Ok(keys.map(|&key| StreamId { tenant: tenant.clone(), key }).collect())
     }
+
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
+        let streams = self.streams.read().expect("no append panics while it holds the log");
+        Ok(streams.keys().cloned().collect())
+    }
+
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        let streams = self.streams.read().expect("no append panics while it holds the log");
+        let kept = streams.get(&stream.tenant).and_then(|tenant| tenant.get(&stream.key));
+        let mut walk = Walk::after(stream.key, Head::EMPTY);
+        for frame in kept.iter().flat_map(|stream| &stream.frames) {
+            walk.step(frame)?;
+        }
+        Ok(walk.last())
+    }
 }

@@ -1,21 +1,24 @@
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Keys;
 use super::cache::{self, Cache, Place};
+use super::origin::{CacheCounter, Found, Origin};
+use super::{CacheCounts, Keys};
 use crate::ids::{Digest, StreamId};
 
+/// What the names of shelves with minds begin with; the tenant follows.
+pub(super) const SHELVES: &str = "minds/";
+
 /// The bytes of minds by their digest, each sealed for the person who taught it (a mind holds
-/// people's words). A cache: what is missing is trained again.
+/// people's words). A cache: what is missing, damaged or of another origin is trained again.
 pub struct ModelStore {
     cache: Arc<dyn Cache>,
     keys: Arc<Keys>,
-    ignored: AtomicU64,
+    counter: CacheCounter,
 }
 
 impl ModelStore {
     pub(super) fn new(cache: Arc<dyn Cache>, keys: Arc<Keys>) -> ModelStore {
-        ModelStore { cache, keys, ignored: AtomicU64::new(0) }
+        ModelStore { cache, keys, counter: CacheCounter::default() }
     }
 
     /// Keeps `bytes` for the person of `stream`. Not durable on return, and need not be.
@@ -23,25 +26,59 @@ impl ModelStore {
     /// The person must have a record already: the key that seals minds is made with the first.
     ///
     /// - errors: a sentence for the log file; nobody is hurt.
-    pub fn put(&self, stream: &StreamId, digest: Digest, bytes: &[u8]) -> Result<(), String> {
-        cache::put(&*self.cache, &self.keys, stream, &place(stream, digest), bytes)
+    pub fn put(
+        &self,
+        stream: &StreamId,
+        origin: &Origin,
+        digest: Digest,
+        bytes: &[u8],
+    ) -> Result<(), String> {
+        let blob = origin.before(bytes);
+        cache::put(&*self.cache, &self.keys, stream, &place(stream, digest), &blob)
     }
 
-    /// The bytes with that digest; none when they are absent or are not what the digest says
-    /// (counted in [`ModelStore::ignored`]). (Invariant `ModelAgrees`.)
-    pub fn load(&self, stream: &StreamId, digest: Digest) -> Option<Vec<u8>> {
-        let (bytes, mut ignored) =
-            cache::get(&*self.cache, &self.keys, stream, &place(stream, digest));
-        let agrees = bytes.filter(|bytes| {
-            let agrees = Digest::of(bytes) == digest;
-            ignored |= !agrees;
-            agrees
-        });
-        if ignored {
-            self.ignored.fetch_add(1, Ordering::Relaxed);
-            tracing::warn!(%stream, %digest, "a stored mind is not usable and is trained again");
+    /// The mind with that digest as `read` makes it of its bytes; damaged when the bytes are not
+    /// what the digest says (invariant `ModelAgrees`) or `read` makes nothing of them, stale when
+    /// they have another origin than `origin`. Counted in [`ModelStore::counts`].
+    pub fn load<T>(
+        &self,
+        stream: &StreamId,
+        origin: &Origin,
+        digest: Digest,
+        read: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Found<T> {
+        let found = self.look(stream, origin, digest, read);
+        self.counter.note(&found);
+        match &found {
+            Found::Damaged => {
+                tracing::warn!(%stream, %digest, "a kept mind is damaged and is trained again");
+            }
+            Found::Stale(_) => {
+                tracing::info!(%stream, %digest, "a kept mind is of other code and is trained again");
+            }
+            Found::Absent | Found::Fits(_) => {}
         }
-        agrees
+        found
+    }
+
+    fn look<T>(
+        &self,
+        stream: &StreamId,
+        origin: &Origin,
+        digest: Digest,
+        read: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Found<T> {
+        let (blob, ignored) = cache::get(&*self.cache, &self.keys, stream, &place(stream, digest));
+        let Some(blob) = blob else {
+            return if ignored { Found::Damaged } else { Found::Absent };
+        };
+        let Some((from, bytes)) = Origin::split(&blob) else { return Found::Damaged };
+        let mind = if Digest::of(bytes) == digest { read(bytes) } else { None };
+        match mind {
+            None => Found::Damaged,
+            Some(mind) if from == *origin => Found::Fits(mind),
+            Some(mind) => Found::Stale(mind),
+        }
     }
 
     /// Forgets the minds of a stream but those named: a person needs the current one, and the one
@@ -53,19 +90,24 @@ impl ModelStore {
         self.cache.replace(&shelf(stream), &stream.key.0, kept)
     }
 
-    /// How many loads found bytes that could not be trusted.
-    pub fn ignored(&self) -> u64 {
-        self.ignored.load(Ordering::Relaxed)
+    /// How often minds were looked for, and what was found.
+    pub fn counts(&self) -> CacheCounts {
+        self.counter.now()
+    }
+
+    /// The counter behind [`ModelStore::counts`].
+    pub fn counter(&self) -> CacheCounter {
+        self.counter.clone()
     }
 }
 
 fn shelf(stream: &StreamId) -> String {
-    format!("models/{}", stream.tenant)
+    format!("{SHELVES}{}", stream.tenant)
 }
 
-fn place(stream: &StreamId, digest: Digest) -> Place<'static> {
+pub(super) fn place(stream: &StreamId, digest: Digest) -> Place<'static> {
     let key = [&stream.key.0[..], &digest.0].concat();
-    Place { purpose: "apprentice 1: mind", shelf: shelf(stream), key, bound: Vec::new() }
+    Place { purpose: "apprentice 2: mind", shelf: shelf(stream), key, bound: Vec::new() }
 }
 
 #[cfg(test)]
@@ -75,6 +117,18 @@ mod tests {
     use super::*;
     use crate::events::Head;
     use crate::limits::STORE_VALUE_BYTES_MAX;
+
+    fn origin(code: &str) -> Origin {
+        Origin { schema: Digest::of(b"1"), code: Digest::of(code.as_bytes()), recipe: Digest::ZERO }
+    }
+
+    fn put(store: &Store, who: &StreamId, digest: Digest, bytes: &[u8]) -> Result<(), String> {
+        store.models.put(who, &origin("this"), digest, bytes)
+    }
+
+    fn load(store: &Store, who: &StreamId, digest: Digest) -> Found<Vec<u8>> {
+        store.models.load(who, &origin("this"), digest, |bytes| Some(bytes.to_vec()))
+    }
 
     /// Runs `check` on minds in memory and on disk.
     fn on_both(check: impl Fn(&Store, &StreamId)) {
@@ -92,12 +146,13 @@ mod tests {
             for length in [0, 1, STORE_VALUE_BYTES_MAX - 40, STORE_VALUE_BYTES_MAX, 900_000] {
                 let bytes: Vec<u8> = (0..length).map(|i| ((i * 31) >> 3) as u8).collect();
                 let digest = Digest::of(&bytes);
-                assert_eq!(store.models.load(ada, digest), None);
-                store.models.put(ada, digest, &bytes).unwrap();
-                store.models.put(ada, digest, &bytes).unwrap();
-                assert_eq!(store.models.load(ada, digest), Some(bytes));
+                assert_eq!(load(store, ada, digest), Found::Absent);
+                put(store, ada, digest, &bytes).unwrap();
+                put(store, ada, digest, &bytes).unwrap();
+                assert_eq!(load(store, ada, digest), Found::Fits(bytes));
             }
-            assert_eq!(store.models.ignored(), 0);
+            let CacheCounts { used, absent, stale, damaged } = store.models.counts();
+            assert_eq!((used, absent, stale, damaged), (5, 5, 0, 0));
         });
     }
 
@@ -105,16 +160,35 @@ mod tests {
     fn bytes_that_are_not_what_the_digest_says_are_absent_and_counted() {
         on_both(|store, ada| {
             let digest = Digest::of(b"a good mind");
-            store.models.put(ada, digest, b"another mind").unwrap();
-            assert_eq!(store.models.load(ada, digest), None);
+            put(store, ada, digest, b"another mind").unwrap();
+            assert_eq!(load(store, ada, digest), Found::Damaged);
             // Bytes damaged on their way do not open.
             let shelf = shelf(ada);
-            store.models.put(ada, digest, b"a good mind").unwrap();
+            put(store, ada, digest, b"a good mind").unwrap();
             let mut entries = store.models.cache.scan(&shelf, &ada.key.0).unwrap();
             entries[0].1[30] ^= 1;
             store.models.cache.replace(&shelf, &ada.key.0, entries).unwrap();
-            assert_eq!(store.models.load(ada, digest), None);
-            assert_eq!(store.models.ignored(), 2);
+            assert_eq!(load(store, ada, digest), Found::Damaged);
+            // Nor do bytes that their reader makes nothing of.
+            put(store, ada, digest, b"a good mind").unwrap();
+            let nothing = store.models.load(ada, &origin("this"), digest, |_| None::<u8>);
+            assert_eq!(nothing, Found::Damaged);
+            assert_eq!(store.models.counts(), CacheCounts { damaged: 3, ..CacheCounts::default() });
+        });
+    }
+
+    #[test]
+    fn a_mind_of_another_origin_is_stale_until_it_is_put_again() {
+        on_both(|store, ada| {
+            let digest = Digest::of(b"a mind");
+            store.models.put(ada, &origin("that"), digest, b"a mind").unwrap();
+            assert_eq!(load(store, ada, digest), Found::Stale(b"a mind".to_vec()));
+            store.models.put(ada, &Origin::UNKNOWN, digest, b"a mind").unwrap();
+            assert_eq!(load(store, ada, digest), Found::Stale(b"a mind".to_vec()));
+            put(store, ada, digest, b"a mind").unwrap();
+            assert_eq!(load(store, ada, digest), Found::Fits(b"a mind".to_vec()));
+            let counts = CacheCounts { used: 1, stale: 2, ..CacheCounts::default() };
+            assert_eq!(store.models.counts(), counts);
         });
     }
 
@@ -123,15 +197,15 @@ mod tests {
         on_both(|store, ada| {
             let words = b"chill the apple means open the fridge";
             let digest = Digest::of(words);
-            store.models.put(ada, digest, words).unwrap();
+            put(store, ada, digest, words).unwrap();
             for (_, value) in store.models.cache.scan(&shelf(ada), &[]).unwrap() {
                 assert!(!value.windows(5).any(|window| window == b"apple"));
             }
             let grace = stream(&store.keys, "local", "grace");
-            assert_eq!(store.models.load(&grace, digest), None);
-            assert!(store.models.put(&grace, digest, words).is_err(), "she has no key yet");
+            assert_eq!(load(store, &grace, digest), Found::Absent);
+            assert!(put(store, &grace, digest, words).is_err(), "she has no key yet");
             store.erase(ada).unwrap();
-            assert_eq!(store.models.load(ada, digest), None);
+            assert_eq!(load(store, ada, digest), Found::Absent);
             assert_eq!(store.models.cache.scan(&shelf(ada), &ada.key.0).unwrap(), []);
         });
     }
@@ -142,10 +216,10 @@ mod tests {
             let minds = [b"first".to_vec(), b"second".repeat(5_000), b"third".to_vec()];
             let digests = minds.each_ref().map(|mind| Digest::of(mind));
             for (mind, digest) in minds.iter().zip(digests) {
-                store.models.put(ada, digest, mind).unwrap();
+                put(store, ada, digest, mind).unwrap();
             }
             store.models.keep_only(ada, &digests[1..]).unwrap();
-            let found = digests.map(|digest| store.models.load(ada, digest).is_some());
+            let found = digests.map(|digest| load(store, ada, digest) != Found::Absent);
             assert_eq!(found, [false, true, true]);
         });
     }

@@ -8,20 +8,14 @@ use super::check;
 use super::closed::Part;
 use super::files::{make_dir, sync_dir, write_whole};
 use super::import;
+use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
 use super::sled::{LogError, SledCache};
 use super::{
     Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog, SnapshotStore,
 };
 use crate::ids::{StreamId, TenantId};
 
-/// The layout of data directories that this binary makes and reads.
-pub const LAYOUT: u32 = 1;
-
-const LAYOUT_FILE: &str = "LAYOUT";
-const LAYOUT_TEXT: &str = "apprentice data directory, layout ";
-const LOCK_FILE: &str = "LOCK";
-/// Stands while a directory is being made; nothing was acknowledged yet.
-const CREATING_FILE: &str = "CREATING";
+pub(super) const LOCK_FILE: &str = "LOCK";
 
 /// Everything durable that a service needs.
 #[derive(Clone)]
@@ -48,8 +42,13 @@ pub enum OpenError {
     )]
     NotOurs { dir: String, found: String },
     #[error(
-        "the data directory {dir} has layout {found}, this version of apprentice knows {LAYOUT}; \
-         use a newer version"
+        "there is no data directory of apprentice at {dir}: {found}; \
+         name the one that people's data was kept in"
+    )]
+    Absent { dir: String, found: &'static str },
+    #[error(
+        "the data directory {dir} has layout {found}, this version of apprentice knows layouts up \
+         to {LAYOUT}; use the version that wrote it or a newer one, or the backup made before that"
     )]
     Newer { dir: String, found: u32 },
     #[error("the file LAYOUT of the data directory {dir} is damaged; restore it from a backup")]
@@ -91,13 +90,16 @@ fn list(damage: &[Damage]) -> String {
     shown.join("; ")
 }
 
-/// Opens the data directory `dir`, and makes it if it does not exist or is empty. One process may
-/// have it open at a time.
+/// Opens the data directory `dir`, and makes it if it does not exist or is empty; one of a former
+/// layout is brought up. One process may have it open at a time.
 pub fn open(dir: &Path) -> Result<Store, OpenError> {
     let fail = Fail(dir);
     make_dir(dir).map_err(|error| fail.io(dir, &error))?;
+    // Before anything is written: what belongs to somebody else is left as it is.
+    standing(dir)?;
     let lock = Arc::new(take_lock(dir)?);
-    let fresh = is_fresh(dir)?;
+    let standing = standing(dir)?;
+    let fresh = standing == Standing::Fresh;
     if fresh {
         write_durably(&dir.join(CREATING_FILE), "").map_err(|e| fail.io(dir, &e))?;
     }
@@ -126,12 +128,19 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
         .map_err(|e| fail.key(e))?;
     let cache =
         SledCache::open(&dir.join("cache"), lock).map_err(|reason| fail.database(reason))?;
-    if fresh {
-        let layout = dir.join(LAYOUT_FILE);
-        write_durably(&layout, &format!("{LAYOUT_TEXT}{LAYOUT}\n"))
-            .and_then(|()| fs::remove_file(dir.join(CREATING_FILE)))
-            .and_then(|()| sync_dir(dir))
-            .map_err(|error| fail.io(&layout, &error))?;
+    match standing {
+        Standing::Fresh => {
+            write_layout(dir, LAYOUT)?;
+            let creating = dir.join(CREATING_FILE);
+            fs::remove_file(&creating)
+                .and_then(|()| sync_dir(dir))
+                .map_err(|error| fail.io(&creating, &error))?;
+        }
+        Standing::At(LAYOUT) => layout::clear_former(&cache),
+        Standing::At(from) => {
+            let former = Former { dir, log: &log, keys: &keys, cache: &cache };
+            layout::bring_up(&former, from, |_| Ok(()))?;
+        }
     }
     Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
 }
@@ -144,7 +153,7 @@ pub fn open_memory() -> Store {
 }
 
 impl Store {
-    fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
+    pub(super) fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
         let models = Arc::new(ModelStore::new(cache.clone(), keys.clone()));
         let snapshots = Arc::new(SnapshotStore::new(cache, keys.clone()));
         Store { log, models, snapshots, keys }
@@ -206,47 +215,12 @@ pub(super) fn lock_existing(dir: &Path) -> Result<File, OpenError> {
     let path = dir.join(LOCK_FILE);
     let file = File::open(&path).map_err(|error| Fail(dir).io(&path, &error))?;
     let file = lock(dir, file)?;
-    match is_fresh(dir)? {
-        false => Ok(file),
-        true => {
+    match standing(dir)? {
+        Standing::At(_) => Ok(file),
+        Standing::Fresh => {
             let found = "nothing that was ever used".to_owned();
             Err(OpenError::NotOurs { dir: Fail(dir).dir(), found })
         }
-    }
-}
-
-/// Whether the directory is still to be made.
-///
-/// - errors: it belongs to somebody else, or to a newer version.
-fn is_fresh(dir: &Path) -> Result<bool, OpenError> {
-    let fail = Fail(dir);
-    if dir.join(CREATING_FILE).exists() {
-        return Ok(true);
-    }
-    let path = dir.join(LAYOUT_FILE);
-    match fs::read(&path) {
-        Ok(bytes) => {
-            let text = std::str::from_utf8(&bytes).ok().and_then(|text| text.strip_suffix('\n'));
-            let number = text.and_then(|text| text.strip_prefix(LAYOUT_TEXT)?.parse().ok());
-            match number {
-                Some(LAYOUT) => Ok(false),
-                Some(found) if found > LAYOUT => Err(OpenError::Newer { dir: fail.dir(), found }),
-                _ => Err(OpenError::Layout { dir: fail.dir() }),
-            }
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            let entries = fs::read_dir(dir).map_err(|error| fail.io(dir, &error))?;
-            for entry in entries {
-                let name = entry.map_err(|error| fail.io(dir, &error))?.file_name();
-                // A crash right at the start leaves these two.
-                if name != LOCK_FILE && name != "CREATING.new" {
-                    let found = format!("{:?}", name.to_string_lossy());
-                    return Err(OpenError::NotOurs { dir: fail.dir(), found });
-                }
-            }
-            Ok(true)
-        }
-        Err(error) => Err(fail.io(&path, &error)),
     }
 }
 
@@ -306,7 +280,7 @@ mod tests {
             open(&dir).unwrap();
         }
         let layout = fs::read_to_string(dir.join("LAYOUT")).unwrap();
-        assert_eq!(layout, "apprentice data directory, layout 1\n");
+        assert_eq!(layout, "apprentice data directory, layout 2\n");
         assert!(!dir.join("CREATING").exists());
         assert!(dir.join("keys/local.key").exists());
     }
@@ -337,9 +311,11 @@ mod tests {
         assert!(refusal(dir.path()).contains("thesis.tex"));
         let file = dir.path().join("thesis.tex");
         assert!(refusal(&file).contains("cannot be used"));
-        assert!(copy_refused(&file).contains("cannot be used"));
+        assert!(copy_refused(&file).contains("it is a file"));
         let empty = tempfile::tempdir().unwrap();
-        assert!(copy_refused(empty.path()).contains("cannot be used"));
+        assert!(copy_refused(dir.path()).contains("it holds other files"));
+        assert!(copy_refused(&dir.path().join("no")).contains("nothing has that name"));
+        assert!(copy_refused(empty.path()).contains("the directory is empty"));
         assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0);
     }
 
@@ -347,7 +323,7 @@ mod tests {
     fn a_layout_that_is_newer_or_damaged_is_refused() {
         let (dir, _) = used();
         for (text, part) in [
-            ("apprentice data directory, layout 2\n", "use a newer version"),
+            ("apprentice data directory, layout 3\n", "the version that wrote it or a newer one"),
             ("apprentice data directory, layout 1", "is damaged"),
             ("apprentice data directory, layout 0\n", "is damaged"),
             ("\u{0}", "is damaged"),

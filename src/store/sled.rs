@@ -245,6 +245,19 @@ impl EventLog for SledLog {
         let keys = heads.get(tenant).into_iter().flat_map(|streams| streams.keys());
         Ok(keys.map(|&key| StreamId { tenant: tenant.clone(), key }).collect())
     }
+
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
+        Ok(SledLog::tenants(self))
+    }
+
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        let head = self.shared.head(stream);
+        if head == Head::EMPTY {
+            return Ok(head);
+        }
+        let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
+        read::walk(&tree, stream.key, head)
+    }
 }
 
 /// A reading of [`Waiting`].

@@ -11,7 +11,7 @@ use super::primitives::answer;
 use super::renaming::{plain_names, rename, replace};
 use super::scenes::{Clashes, Stages};
 use super::score::{self, Verdict};
-use crate::language::{Answer, Symbol, tokens};
+use crate::language::{Answer, Program, Symbol, tokens};
 use crate::learning::{Lesson, Mind, Recipe, train};
 use crate::world::Domain;
 use crate::world::household::{Household, Kind, Scene, Task};
@@ -41,6 +41,8 @@ pub(super) struct Tests<'a> {
     pub groups: &'a [(&'a str, Vec<&'a Row>)],
     pub primitives: &'a [&'a Row],
     pub seed: u64,
+    /// Sentences of the teacher that are taught.
+    pub lessons: usize,
 }
 
 /// What one episode found.
@@ -108,19 +110,14 @@ impl Asked {
     }
 }
 
-/// - returns: `None` when nobody has two sentences for anything that could be taught.
+/// - returns: `None` when nobody has enough sentences for anything that could be taught.
 pub(super) fn run<'a>(tests: &Tests<'a>, number: usize) -> Option<Episode> {
     let (group, rows) = &tests.groups[number % tests.groups.len()];
     let mut unstaged = Vec::new();
-    let (row, scene) = choose_lesson(tests, number, rows, &mut unstaged)?;
-    let lesson = Lesson {
-        utterance: row.sentence.clone(),
-        program: row.program.clone(),
-        scene: Arc::new(scene),
-        task: Arc::new(Task::free()),
-        mentioned: None,
-    };
-    let trained = train(tests.household, tests.recipe, std::slice::from_ref(&lesson));
+    let taught = choose_lessons(tests, number, rows, &mut unstaged)?;
+    let lessons: Vec<_> = taught.iter().map(|(row, scene)| lesson(row, scene.clone())).collect();
+    let (row, _) = taught[0];
+    let trained = train(tests.household, tests.recipe, &lessons);
     let training_failed = trained.as_ref().err().map(ToString::to_string);
     let mind = trained.as_ref().unwrap_or(tests.before);
 
@@ -129,7 +126,8 @@ pub(super) fn run<'a>(tests: &Tests<'a>, number: usize) -> Option<Episode> {
         draw::some(&mut draw::rng(tests.seed, &[what, &number_text]), &rows, count)
     };
     let (own, others): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|r| r.user == row.user);
-    let own = own.into_iter().filter(|other| other.id != row.id).collect();
+    let own = own.into_iter().filter(|other| taught.iter().all(|(row, _)| other.id != row.id));
+    let own = own.collect();
     let same_person = draw("same person", own, SAME_PERSON);
     let others = draw("others", others, OTHERS);
     let other_groups = tests.groups.iter().filter(|(other, _)| other != group);
@@ -138,7 +136,8 @@ pub(super) fn run<'a>(tests: &Tests<'a>, number: usize) -> Option<Episode> {
         .collect();
     let primitives = draw("primitives", tests.primitives.to_vec(), PRIMITIVES);
 
-    let mut ask = Ask { tests, mind, lesson: row, unstaged };
+    let programs: Vec<&Program> = taught.iter().map(|(row, _)| &row.program).collect();
+    let mut ask = Ask { tests, mind, lesson: row, programs: &programs, unstaged };
     let retold: Vec<Row> = retold(tests, number, row);
     Some(Episode {
         group: (*group).to_owned(),
@@ -152,26 +151,42 @@ pub(super) fn run<'a>(tests: &Tests<'a>, number: usize) -> Option<Episode> {
     })
 }
 
-/// One sentence of one person who has another for the same; people are equally likely, whether
-/// they wrote much or little.
-fn choose_lesson<'a>(
+fn lesson(row: &Row, scene: Scene) -> Lesson<Scene, Task> {
+    Lesson {
+        utterance: row.sentence.clone(),
+        program: row.program.clone(),
+        scene: Arc::new(scene),
+        task: Arc::new(Task::free()),
+        mentioned: None,
+    }
+}
+
+/// The wanted number of sentences of one person who has another for the same; people are equally
+/// likely, whether they wrote much or little. The first does not depend on how many are wanted, as
+/// long as its person has enough.
+fn choose_lessons<'a>(
     tests: &Tests<'_>,
     number: usize,
     rows: &[&'a Row],
     unstaged: &mut Vec<String>,
-) -> Option<(&'a Row, Scene)> {
+) -> Option<Vec<(&'a Row, Scene)>> {
     let mut rng = draw::rng(tests.seed, &["lesson", &number.to_string()]);
     let count = |user: &str| rows.iter().filter(|row| row.user == user).count();
     let users: BTreeSet<&str> = rows.iter().map(|row| row.user.as_str()).collect();
-    let mut users: Vec<&str> = users.into_iter().filter(|user| count(user) >= 2).collect();
+    let mut users: Vec<&str> =
+        users.into_iter().filter(|user| count(user) > tests.lessons).collect();
     rng.shuffle(&mut users);
     for user in users {
         let mut own: Vec<&Row> = rows.iter().filter(|row| row.user == user).copied().collect();
         rng.shuffle(&mut own);
+        let mut taught = Vec::new();
         for row in own {
             match stage(tests, row) {
-                Ok(scene) => return Some((row, scene)),
+                Ok(scene) => taught.push((row, scene)),
                 Err(reason) => unstaged.push(reason),
+            }
+            if taught.len() == tests.lessons {
+                return Some(taught);
             }
         }
     }
@@ -217,10 +232,16 @@ struct Ask<'a> {
     tests: &'a Tests<'a>,
     mind: &'a Mind,
     lesson: &'a Row,
+    /// What all lessons mean.
+    programs: &'a [&'a Program],
     unstaged: Vec<String>,
 }
 
 impl Ask<'_> {
+    fn accepted(&self, answer: &Answer) -> bool {
+        self.programs.iter().any(|program| score::accepted_as(program, &answer.outcome))
+    }
+
     fn each(
         &mut self,
         rows: &[&Row],
@@ -238,7 +259,7 @@ impl Ask<'_> {
             };
             let answer = answer(self.tests.household, self.mind, &scene, row);
             let (verdict, failure) = judge(row, &scene, &answer, &explain);
-            let accepted = score::accepted_as(&self.lesson.program, &answer.outcome);
+            let accepted = self.accepted(&answer);
             asked.0.push(Judged { verdict, accepted, short: is_short(row), failure });
         }
         asked
@@ -260,10 +281,11 @@ impl Ask<'_> {
     }
 
     fn distractors(&mut self, rows: &[&Row]) -> Asked {
-        let (household, lesson) = (self.tests.household, self.lesson);
+        let (household, lesson, programs) = (self.tests.household, self.lesson, self.programs);
         self.each(rows, |row, scene, answer, explain| {
             let verdict = score::judge_taught(household, scene, &row.program, &answer.outcome);
-            let accepted = score::accepted_as(&lesson.program, &answer.outcome);
+            let accepted =
+                programs.iter().any(|program| score::accepted_as(program, &answer.outcome));
             let failure = accepted.then(|| {
                 let mut failure = explain.taught(row, &lesson.program, verdict, answer);
                 failure.reason = format!("{} taken for {}", row.label, lesson.label);
@@ -276,13 +298,13 @@ impl Ask<'_> {
     }
 
     fn primitives(&mut self, rows: &[&Row]) -> Asked {
-        let lesson = self.lesson;
+        let programs = self.programs;
         self.each(rows, |row, scene, answer, explain| {
             let verdict = score::judge_primitive(&row.program, &answer.outcome);
             let failed = verdict != Verdict::Right;
             let failure = failed.then(|| {
                 let mut failure = explain.primitive(row, scene, verdict, answer);
-                if score::accepted_as(&lesson.program, &answer.outcome) {
+                if programs.iter().any(|program| score::accepted_as(program, &answer.outcome)) {
                     failure.reason = "taken for the lesson".to_owned();
                 }
                 failure

@@ -36,6 +36,8 @@ pub struct LessonsReport {
     #[serde(flatten)]
     pub base: Base,
     pub episodes: usize,
+    /// Sentences taught in each.
+    pub lessons: usize,
     /// Lessons that could not be learned; the mind of before was asked then.
     pub trainings_failed: BTreeMap<String, usize>,
     #[serde(flatten)]
@@ -113,6 +115,7 @@ pub fn lessons(
             groups: &material.groups,
             primitives: &primitives,
             seed,
+            lessons: setting.lessons,
         };
         let numbers: Vec<usize> = (0..setting.limit.unwrap_or(EPISODES)).collect();
         let of_seed =
@@ -144,6 +147,7 @@ pub fn lessons(
     Ok(LessonsReport {
         base,
         episodes: episodes.len(),
+        lessons: setting.lessons,
         trainings_failed,
         figures: Figures::of(episodes.iter()),
         by_action: by_action.collect(),

@@ -4,12 +4,14 @@
 //! A parser is given what a person's sentence and the scene would give it; everything else a
 //! corpus knows is for judging the answer.
 
+pub mod ablation;
 pub mod corpus;
 mod draw;
 mod episode;
 pub mod failures;
 pub mod figures;
 pub mod goals;
+pub mod known_minds;
 pub mod lessons;
 pub mod one_shot;
 pub mod parallel;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::corpus::Row;
 use super::draw;
 use super::failures::{Explain, Failure};
-use super::figures::{Reasons, Shares, share};
+use super::figures::{Reasons, Shares, Spread, share};
 use super::parallel::in_order;
 use super::report::{Base, Setting};
 use super::scenes::{Clashes, Stages};
@@ -37,6 +37,8 @@ pub struct PrimitivesReport {
     /// Of all untaught ones, those that came to what was meant, said in primitives.
     pub untaught_right: f64,
     pub by_action: BTreeMap<String, Shares>,
+    /// The same figures once for each person, and then their mean: few people wrote most rows.
+    pub by_person: ByPerson,
     /// The same sentences with other things of the same name in the scene.
     pub clashes: Shares,
     /// Per seed, the shares of that seed alone.
@@ -47,6 +49,49 @@ pub struct PrimitivesReport {
     pub reasons: Reasons,
     #[serde(skip)]
     pub failures: Vec<Failure>,
+}
+
+/// Shares of single people, averaged. Nobody is named.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ByPerson {
+    pub right: Spread,
+    pub wrong: Spread,
+    pub untaught_accepted: Spread,
+    /// The largest shares, largest first.
+    pub worst_wrong: Vec<f64>,
+    pub worst_untaught_accepted: Vec<f64>,
+}
+
+/// How many of the worst people are reported.
+const WORST: usize = 5;
+
+impl ByPerson {
+    fn of(judged: &[Judged]) -> ByPerson {
+        let mut people: BTreeMap<&str, [Vec<Verdict>; 2]> = BTreeMap::new();
+        for one in judged {
+            let [primitives, untaught] = people.entry(&one.user).or_default();
+            if one.untaught { untaught } else { primitives }.push(one.verdict);
+        }
+        let shares = |which: usize, counts: &dyn Fn(&Verdict) -> bool| -> Vec<f64> {
+            let said = people.values().map(|of| &of[which]).filter(|said| !said.is_empty());
+            said.map(|said| share(said.iter().filter(|v| counts(v)).count(), said.len())).collect()
+        };
+        let worst = |mut shares: Vec<f64>| {
+            shares.sort_by(|a, b| b.total_cmp(a));
+            shares.truncate(WORST);
+            shares
+        };
+        let right = shares(0, &|verdict| *verdict == Verdict::Right);
+        let wrong = shares(0, &|verdict| *verdict == Verdict::Wrong);
+        let untaught = shares(1, &|verdict| *verdict != Verdict::NotSure);
+        ByPerson {
+            right: Spread::of(&right),
+            wrong: Spread::of(&wrong),
+            untaught_accepted: Spread::of(&untaught),
+            worst_wrong: worst(wrong),
+            worst_untaught_accepted: worst(untaught),
+        }
+    }
 }
 
 /// Whether a row belongs to the primitives of this protocol.
@@ -105,6 +150,7 @@ pub fn primitives(setting: &Setting<'_>, rows: &[Row]) -> Result<PrimitivesRepor
 /// One sentence, judged.
 struct Judged {
     label: String,
+    user: String,
     untaught: bool,
     verdict: Verdict,
     distance: f32,
@@ -147,7 +193,8 @@ fn judge(
         false => explain.primitive(row, &scene, verdict, &answer),
     });
     let distance = score::distance(&answer.evidence);
-    Ok(Judged { label: row.label.clone(), untaught, verdict, distance, clashing, failure })
+    let (label, user) = (row.label.clone(), row.user.clone());
+    Ok(Judged { label, user, untaught, verdict, distance, clashing, failure })
 }
 
 /// The answer to a row's sentence, said in a scene at the start of an episode.
@@ -164,6 +211,7 @@ fn summarise(
     training: BTreeMap<String, f64>,
     failures: usize,
 ) -> PrimitivesReport {
+    let by_person = ByPerson::of(&judged);
     let (untaught, primitives): (Vec<&Judged>, Vec<&Judged>) =
         judged.iter().partition(|one| one.untaught);
     let scored = |rows: &[&Judged]| -> Vec<(Verdict, f32)> {
@@ -190,6 +238,7 @@ fn summarise(
         untaught_accepted: share(accepted, untaught.len()),
         untaught_right: share(of(&[Verdict::Right]), untaught.len()),
         by_action,
+        by_person,
         clashes: Shares::of(&clashing),
         by_seed,
         training,

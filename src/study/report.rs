@@ -9,6 +9,7 @@ use super::people::People;
 use crate::learning::Recipe;
 
 /// What a protocol is run with.
+#[derive(Clone, Copy)]
 pub struct Setting<'a> {
     pub recipe: &'a Recipe,
     /// Each draws its own rows and scenes and trains with its own training seed.
@@ -18,6 +19,8 @@ pub struct Setting<'a> {
     pub people: People,
     pub threads: usize,
     pub progress: &'a dyn Progress,
+    /// Sentences of the teacher that an episode teaches.
+    pub lessons: usize,
     /// Failures kept of each kind.
     pub failures: usize,
 }

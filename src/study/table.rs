@@ -52,6 +52,22 @@ impl Display for PrimitivesReport {
             self.untaught_n,
             percent(self.untaught_right)
         )?;
+        let people = &self.by_person;
+        writeln!(
+            f,
+            "\n{:<22}{:>10}{:>9}{:>9}   worst",
+            "averaged over people", "mean", "sd", "people"
+        )?;
+        let rows = [
+            ("  right", people.right, &[][..]),
+            ("  wrong", people.wrong, &people.worst_wrong[..]),
+            ("  untaught accepted", people.untaught_accepted, &people.worst_untaught_accepted[..]),
+        ];
+        for (name, Spread { mean, sd, n }, worst) in rows {
+            let worst: Vec<String> = worst.iter().map(|share| percent(*share)).collect();
+            let worst = worst.join(", ");
+            writeln!(f, "{name:<22}{:>10}{:>9}{n:>9}   {worst}", percent(mean), percent(sd))?;
+        }
         reasons(f, "Why not right", &self.reasons)?;
         failures(f, "Failures", &self.failures)
     }
@@ -61,6 +77,9 @@ impl Display for LessonsReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.base)?;
         write!(f, "{} episodes", self.episodes)?;
+        if self.lessons > 1 {
+            write!(f, ", {} lessons each", self.lessons)?;
+        }
         match self.trainings_failed.values().sum::<usize>() {
             0 => writeln!(f)?,
             failed => writeln!(f, ", {failed} with a training that failed")?,

@@ -87,6 +87,12 @@ pub trait Domain: Send + Sync + 'static {
         None
     }
 
+    /// Whether a word says of the things of a type what none of them is: "the clean mug" where all
+    /// mugs are dirty. A word that names no state says nothing of the kind.
+    fn unlike(&self, _scene: &Self::Scene, _kind: &Symbol, _word: &str) -> bool {
+        false
+    }
+
     /// BLAKE3 over a fixed binary form of the scene. Computed after every utterance and on every
     /// replay, so it must be cheap: no text, no allocation per object.
     fn digest(&self, scene: &Self::Scene) -> Digest;

@@ -93,6 +93,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("retrain_completed.report.exemplars", "seeds and live lessons"),
     ("retrain_completed.report.threshold", "the calibrated threshold"),
     ("retrain_completed.report.figures", "what else the parser kind reports, by name"),
+    ("retrain_completed.code", "digest of the code that trained; null when version 1 did not say"),
     ("retrain_failed.recipe", "digest of the recipe"),
     ("retrain_failed.reason", "why; the previous mind stays"),
     ("session_closed.reason", "why the person withdrew"),
@@ -206,7 +207,8 @@ fn scheduled() -> RetrainScheduled {
 fn completed() -> RetrainCompleted {
     let figures = BTreeMap::from([("precision".to_owned(), 0.9375), ("steps".to_owned(), 400.0)]);
     let report = Report { exemplars: 45, threshold: 0.42, figures };
-    RetrainCompleted { recipe: Digest::of(b"paper"), mind: Digest::of(b"mind"), report }
+    let code = Some(Digest::of(b"code"));
+    RetrainCompleted { recipe: Digest::of(b"paper"), mind: Digest::of(b"mind"), report, code }
 }
 
 fn failed() -> RetrainFailed {

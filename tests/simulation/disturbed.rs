@@ -55,6 +55,14 @@ impl EventLog for Disturbed {
         self.inner.head(stream)
     }
 
+    fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
+        self.inner.tenants()
+    }
+
+    fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
+        self.inner.walk(stream)
+    }
+
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         self.inner.streams(tenant)
     }

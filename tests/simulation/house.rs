@@ -9,7 +9,7 @@ use apprentice::events::{Durable, Head, Report};
 use apprentice::ids::{Digest, RequestId, TenantId, Timestamp, UserId};
 use apprentice::invariants::Invariant;
 use apprentice::learning::{self, Lesson, Mind, Recipe};
-use apprentice::replay::{Minds, keep_snapshot, rebuild};
+use apprentice::replay::{Minds, keep_mind, keep_snapshot, mind_origin, rebuild};
 use apprentice::session::{Command, Outstanding, Phase, Proposed, Reply, Session, Told, reply_of};
 use apprentice::store::{
     AppendError, EventLog, FaultPlan, FaultyLog, Keys, MemoryLog, Pending, SeededEntropy, Store,
@@ -167,13 +167,13 @@ impl House {
         let mut share = |most: usize| dice.below(most + 1) as u32;
         let plan = FaultPlan {
             seed,
-            script: Vec::new(),
             refused: share(80),
             unacknowledged: share(80),
             held_answers: share(150),
             held_appends: share(150),
             crashes_before: share(12),
             crashes_after: share(12),
+            ..FaultPlan::default()
         };
         let faulty = Arc::new(FaultyLog::new(inner.clone(), plan));
         let disturbed = Arc::new(Disturbed::new(faulty.clone()));
@@ -508,7 +508,7 @@ impl House {
             let learning::Report { exemplars, threshold, figures } = mind.report().clone();
             let digest = mind.digest();
             // Nothing hangs on it: the bytes of a mind are a cache.
-            let _ = self.store.models.put(&stream, digest, &mind.to_bytes());
+            let _ = keep_mind(&self.store, &stream, &mind);
             self.processes[process].minds.put(&stream.tenant, Arc::new(mind));
             (digest, Report { exemplars, threshold, figures })
         });
@@ -560,7 +560,8 @@ impl House {
         let named: Vec<Digest> = seats.filter_map(|seat| seat.session.state().mind).collect();
         if self.dice.chance(50) {
             for digest in named {
-                let _ = self.store.models.put(&stream, digest, b"not the bytes of a mind");
+                let origin = mind_origin(digest);
+                let _ = self.store.models.put(&stream, &origin, digest, b"not a mind's bytes");
             }
         }
     }

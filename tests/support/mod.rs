@@ -1,4 +1,5 @@
 //! Shared by integration tests; each uses the parts it needs.
 #![allow(dead_code)]
 
+pub mod diary;
 pub mod toy;

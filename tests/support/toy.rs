@@ -2,7 +2,7 @@
 //! trains in no time, and proves that nothing outside `world/` knows about mugs.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, Condvar, Mutex};
 
 use apprentice::ids::Digest;
 use apprentice::language::{
@@ -15,12 +15,33 @@ use apprentice::world::{
 };
 
 /// Bells ring until they are muted. Break one and the world panics, which is for tests of what the
-/// service makes of it; so is `brittle`, a world in which training a reranker panics.
+/// service makes of it; so are `brittle`, a world in which training a reranker panics, and `slow`,
+/// one in which it waits for a gate.
 pub struct Bells {
     brittle: bool,
+    gate: Option<Arc<Gate>>,
     signature: Signature,
     lexicon: Lexicon,
     seeds: SeedSet,
+}
+
+/// Closed until it is opened.
+#[derive(Default)]
+pub struct Gate {
+    is_open: Mutex<bool>,
+    changed: Condvar,
+}
+
+impl Gate {
+    pub fn open(&self) {
+        *self.is_open.lock().unwrap() = true;
+        self.changed.notify_all();
+    }
+
+    fn pass(&self) {
+        let closed = |is_open: &mut bool| !*is_open;
+        drop(self.changed.wait_while(self.is_open.lock().unwrap(), closed).unwrap());
+    }
 }
 
 /// Bells that ring.
@@ -47,6 +68,11 @@ impl Bells {
     /// A world in which training a reranker panics.
     pub fn brittle() -> Bells {
         Bells { brittle: true, ..Bells::new() }
+    }
+
+    /// A world in which training a reranker waits until the gate is open.
+    pub fn slow(gate: Arc<Gate>) -> Bells {
+        Bells { gate: Some(gate), ..Bells::new() }
     }
 
     /// A world without a word for breaking, so that no training can come to it.
@@ -87,7 +113,7 @@ impl Bells {
             ],
         };
         let operators = ["RING", "MUTE", "BREAK"].map(operator).to_vec();
-        Bells { brittle: false, signature: Signature { operators }, lexicon, seeds }
+        Bells { brittle: false, gate: None, signature: Signature { operators }, lexicon, seeds }
     }
 }
 
@@ -167,6 +193,7 @@ impl Domain for Bells {
     }
     fn features(&self, scene: &Ringing, _: &Program) -> Vec<f32> {
         assert!(!self.brittle, "the world is brittle");
+        self.gate.iter().for_each(|gate| gate.pass());
         vec![scene.len() as f32 / 3.0]
     }
     fn digest(&self, scene: &Ringing) -> Digest {

@@ -1,6 +1,6 @@
 //! The long runs behind `docs/reliability.md`. The test command makes short ones of each.
 
-use crate::machine::run_with;
+use crate::machine::{self, run_with};
 
 /// Runs `seeds` seeds of the simulator from `first` on; the first that breaks a law is printed.
 pub fn simulate(seeds: u64, first: u64) -> Result<(), String> {
@@ -9,4 +9,26 @@ pub fn simulate(seeds: u64, first: u64) -> Result<(), String> {
         "cargo",
         &["test", "--release", "--test", "simulation", "--", "--nocapture", "whatever_fails"],
     )
+}
+
+/// Kills the service so many times; the first acknowledgement that is not found again is printed.
+pub fn crash(kills: u64, seed: Option<u64>) -> Result<(), String> {
+    faults("whenever_it_is_killed", "APPRENTICE_KILLS", kills, seed)
+}
+
+/// Copies so many images of a disk in mid-write; the first that broke a promise is printed.
+///
+/// - errors: this machine cannot do it, too.
+pub fn powerloss(images: u64, seed: Option<u64>) -> Result<(), String> {
+    machine::disk_tools()?;
+    faults("after_a_power_cut", "APPRENTICE_IMAGES", images, seed)
+}
+
+fn faults(test: &str, variable: &str, count: u64, seed: Option<u64>) -> Result<(), String> {
+    let (count, seed) = (count.to_string(), seed.map(|seed| seed.to_string()));
+    // A long run that skips what it was started for has failed.
+    let mut environment = vec![(variable, &*count), ("CI", "true")];
+    environment.extend(seed.as_deref().map(|seed| ("APPRENTICE_SEED", seed)));
+    let arguments = ["test", "--release", "--test", "faults", "--", "--nocapture", test];
+    run_with(&environment, "cargo", &arguments)
 }

@@ -42,6 +42,43 @@ pub fn run_with(
     }
 }
 
+/// The folder that cargo builds into.
+fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+}
+
+/// The service as released.
+///
+/// - errors: it does not build.
+pub fn release_binary() -> Result<PathBuf, String> {
+    run(
+        "cargo",
+        &["build", "--release", "--quiet", "--package", "apprentice", "--bin", "apprentice"],
+    )?;
+    Ok(target().join("release/apprentice"))
+}
+
+/// The service without any optimisation. The packages it depends on are those of the development
+/// build: only our own are built once more, which a profile of its own would not allow.
+///
+/// - errors: it does not build.
+pub fn unoptimised_binary() -> Result<PathBuf, String> {
+    let own = "profile.dev.package.apprentice.opt-level=0";
+    let migrations = "profile.dev.package.apprentice-migrations.opt-level=0";
+    let what = ["--quiet", "--package", "apprentice", "--bin", "apprentice"];
+    run("cargo", &[&["build", "--config", own, "--config", migrations], &what[..]].concat())?;
+    // The next development build takes that place again.
+    let (built, kept) =
+        (target().join("debug/apprentice"), target().join("unoptimised-apprentice"));
+    std::fs::copy(&built, &kept).map_err(|e| format!("cannot copy {}: {e}", built.display()))?;
+    Ok(kept)
+}
+
+/// Installs the emulator of other processors unless it is there.
+pub fn qemu() -> Result<(), String> {
+    debian("qemu-user", || answers("qemu-x86_64", &["--version"]))
+}
+
 /// A Python with the packages of the wire's example, in `target/python`.
 pub fn python() -> Result<PathBuf, String> {
     let folder = root().join("target/python");
@@ -66,6 +103,13 @@ pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
     }
     run("apt-get", &["update", "--quiet"])?;
     run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", package])
+}
+
+/// What makes and mounts a file system in a file.
+pub fn disk_tools() -> Result<(), String> {
+    debian("e2fsprogs", || answers("mkfs.ext4", &["-V"]))?;
+    debian("mount", || answers("losetup", &["--version"]))?;
+    debian("util-linux", || answers("unshare", &["--version"]))
 }
 
 /// Installs the licence checker unless it is there.

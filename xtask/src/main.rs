@@ -36,6 +36,26 @@ enum Task {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
+    /// The service killed: as many SIGKILLs as wanted, in the release build.
+    ///
+    /// Example: cargo xtask crash --kills 1000
+    Crash {
+        #[arg(long)]
+        kills: u64,
+        /// As an earlier run printed it; drawn when left out.
+        #[arg(long)]
+        seed: Option<u64>,
+    },
+    /// The power cut: as many images of a disk as wanted, in the release build. Needs root.
+    ///
+    /// Example: cargo xtask powerloss --images 500
+    Powerloss {
+        #[arg(long)]
+        images: u64,
+        /// As an earlier run printed it; drawn when left out.
+        #[arg(long)]
+        seed: Option<u64>,
+    },
     /// The benchmarks behind docs/performance.md.
     Bench {
         /// Passed to `cargo bench`.
@@ -47,6 +67,8 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Test { only } => stage::run_all(&only),
         Task::Simulate { seeds, seed } => drills::simulate(seeds.unwrap_or(1), seed),
+        Task::Crash { kills, seed } => drills::crash(kills, seed),
+        Task::Powerloss { images, seed } => drills::powerloss(images, seed),
         Task::Bench { filter } => stage::bench(filter.as_deref()),
     };
     match done {

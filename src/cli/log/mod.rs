@@ -10,9 +10,8 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::failure::Failure;
-use super::{data_dir, embedded};
+use super::{embedded, past};
 use crate::ids::{Seq, TenantId};
-use crate::store;
 
 /// Read what was recorded.
 #[derive(Debug, Args)]
@@ -60,18 +59,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 fn show(arguments: Show) -> Result<(), Failure> {
     let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
     let user = embedded::user(&arguments.user)?;
-    let directory = data_dir::choose(arguments.data)?;
-    let copy = store::copy_private(&directory).map_err(Failure::bad_input)?;
-    let store = copy.open().map_err(Failure::bad_input)?;
-    let stream = store.keys.stream_id(&tenant, &user).map_err(Failure::bad_input)?;
-    let head = store.log.head(&stream).map_err(Failure::failed)?;
-    if head.seq == 0 {
-        return Err(Failure::bad_input(format!(
-            "{} holds no records of user {:?} in tenant {tenant}",
-            directory.display(),
-            user.as_str()
-        )));
-    }
+    let past = past::open(arguments.data)?;
+    let (store, stream) = (&past.store, past.stream(&tenant, &user)?);
     let mut stdout = std::io::stdout().lock();
     for record in store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)? {
         let record = record.map_err(Failure::failed)?;

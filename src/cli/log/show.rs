@@ -3,29 +3,13 @@ use serde_json::{Value, json};
 use crate::events::{Ending, Event, Record};
 use crate::ids::Timestamp;
 use crate::language::Outcome;
+use crate::replay;
 
 /// One record as a JSON object: its number, its kind and its whole body. No times, so that equal
 /// histories print equal bytes.
 pub fn json(record: &Record) -> Value {
     let kind = format!("{:?}", record.event.kind());
-    json!({ "seq": record.seq.get(), "kind": kind, "event": body(&record.event) })
-}
-
-fn body(event: &Event) -> Value {
-    let value = match event {
-        Event::SessionOpened(event) => serde_json::to_value(event),
-        Event::EpisodeStarted(event) => serde_json::to_value(event),
-        Event::Interpreted(event) => serde_json::to_value(event),
-        Event::EpisodeEnded(event) => serde_json::to_value(event),
-        Event::DecompositionTaught(event) => serde_json::to_value(event),
-        Event::DecompositionDeclined(event) => serde_json::to_value(event),
-        Event::LessonForgotten(event) => serde_json::to_value(event),
-        Event::RetrainScheduled(event) => serde_json::to_value(event),
-        Event::RetrainCompleted(event) => serde_json::to_value(event),
-        Event::RetrainFailed(event) => serde_json::to_value(event),
-        Event::SessionClosed(event) => serde_json::to_value(event),
-    };
-    value.expect("an event is plain data")
+    json!({ "seq": record.seq.get(), "kind": kind, "event": replay::body(&record.event) })
 }
 
 /// One record for a person: number, time (UTC), kind, and what it says.

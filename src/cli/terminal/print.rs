@@ -322,8 +322,8 @@ pub fn sentence(clause: &str) -> String {
 }
 
 /// `1 action`, `2 actions`.
-pub fn count(number: u32, noun: &str) -> String {
-    match number {
+pub fn count(number: impl Into<u64>, noun: &str) -> String {
+    match number.into() {
         1 => format!("1 {noun}"),
         n => format!("{n} {noun}s"),
     }

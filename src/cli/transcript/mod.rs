@@ -13,8 +13,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::embedded;
+use super::embedded::{self, Wanted};
 use super::failure::Failure;
+use crate::language::{Evidence, Outcome};
 use crate::service::{Data, Service};
 pub use file::{PlayedFile, TranscriptFile};
 
@@ -84,7 +85,7 @@ impl Services {
     fn play(&mut self, file: &TranscriptFile) -> Result<PlayedFile, Failure> {
         let recipe = file.recipe_text()?;
         if !self.by_recipe.contains_key(&recipe) {
-            let service = embedded::start(Data::Memory, recipe.clone(), Vec::new())?;
+            let service = embedded::start(Wanted::inside(Data::Memory, recipe.clone()))?;
             self.by_recipe.insert(recipe.clone(), service);
         }
         let service = &self.by_recipe[&recipe];
@@ -92,6 +93,11 @@ impl Services {
         let client = service.connect(file.person(self.people)?).map_err(Failure::failed)?;
         file.play(&client)
     }
+}
+
+/// What came of an utterance, as a line of a transcript.
+pub(super) fn show_answer(outcome: &Outcome, evidence: &Evidence, actions_before: u32) -> String {
+    play::show(outcome, evidence, actions_before).1
 }
 
 fn write(text: &str) -> Result<(), Failure> {

@@ -14,6 +14,9 @@ use crate::world::Stage;
 /// How long one training may take.
 const LEARNING_MAX: Duration = Duration::from_secs(600);
 
+/// The task that gives tasks back to the seed. No world has a task of one such word.
+const DRAWN: &str = "drawn";
+
 /// Why a transcript could not be played to its end.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PlayError {
@@ -91,6 +94,7 @@ impl<'a> Player<'a> {
             // Whoever started the service has read these two.
             Setting::User(_) | Setting::Recipe(_) => {}
             Setting::Seed(seed) => self.seed = *seed,
+            Setting::Task(task) if task == DRAWN => self.task = None,
             Setting::Task(task) => self.task = Some(task.clone()),
             Setting::Scene(name) => {
                 let path = self.directory.join(name);
@@ -275,7 +279,7 @@ fn code_name(code: RejectionCode) -> String {
     }
 }
 
-fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answer, String) {
+pub(super) fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answer, String) {
     match outcome {
         Outcome::Understood { program, .. } => {
             let (first, last) = (before + 1, before + program.steps.len() as u32);

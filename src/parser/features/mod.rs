@@ -8,6 +8,7 @@ mod sentence;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod unread;
 
 use std::collections::BTreeMap;
 
@@ -203,7 +204,12 @@ impl FeaturesParser {
 
     fn judge(&self, clause: &Clause, sentence: &Sentence) -> Vec<Judged> {
         let words = &clause.lifted.words;
-        self.primitives.judge(&self.knowledge, &self.settings.primitive, words, sentence)
+        let mut judged =
+            self.primitives.judge(&self.knowledge, &self.settings.primitive, words, sentence);
+        let verb = self.knowledge.grammar().main_verb(words);
+        let unread = self.knowledge.unread(words, verb.as_ref());
+        judged.iter_mut().for_each(|judged| judged.logit += self.settings.unread * unread as f32);
+        judged
     }
 
     fn lesson_scores(&self, clause: &Clause, sentence: &Sentence) -> Vec<f32> {

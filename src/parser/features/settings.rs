@@ -13,6 +13,12 @@ pub struct FeaturesSettings {
     pub lesson_max: f32,
     /// From this probability on a lesson decides, whatever its words mean as primitives.
     pub lesson_decides: f32,
+    /// Added to every primitive's logit for each word that says more than one primitive does
+    /// ("to chill it", "for a minute"). Not learned: recorded primitives hardly have such words.
+    ///
+    /// Release 0.1 did not have it, and its recipes keep their digest without it.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub unread: f32,
     pub primitive: PrimitiveWeights,
     pub lesson: LessonSettings,
 }
@@ -75,6 +81,10 @@ pub struct LessonWeights {
     pub one: f32,
 }
 
+fn is_nothing(weight: &f32) -> bool {
+    *weight == 0.0
+}
+
 impl FeaturesSettings {
     /// - errors: the field and what was expected.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
@@ -91,6 +101,10 @@ impl FeaturesSettings {
                     format!("{field} is {value}; expected a probability between {min} and 0.99");
                 return Err((field, reason));
             }
+        }
+        if !(-50.0..=0.0).contains(&self.unread) {
+            let reason = format!("unread is {}; expected between -50 and 0", self.unread);
+            return Err(("unread", reason));
         }
         Ok(())
     }

@@ -177,3 +177,19 @@ fn clauses_are_cut_only_where_a_verb_follows() {
     let silent: BTreeSet<&str> = world.lists.silent.iter().map(String::as_str).collect();
     assert!(silent.contains("the"));
 }
+
+#[test]
+fn words_that_ask_for_more_than_the_verb_make_a_primitive_unlikely() {
+    let parser = World::new().taught(&[]);
+    for text in ["put the <obj> on the <obj>", "put the wet <obj> on the <obj>"] {
+        assert!(!parser.parse(&clause(text)).candidates.is_empty(), "{text}");
+    }
+    for text in [
+        "put the <obj> on the <obj> to chill",
+        "put the <obj> on the <obj> to cool <obj> off",
+        "put the <obj> on the <obj> for a few minutes",
+        "take the <obj> put the <obj> on the <obj>",
+    ] {
+        assert!(parser.parse(&clause(text)).candidates.is_empty(), "{text}");
+    }
+}

@@ -35,6 +35,25 @@ impl SledCache {
     }
 }
 
+impl SledCache {
+    /// Forgets every shelf whose name begins with `begin`.
+    pub(in super::super) fn drop_shelves(&self, begin: &str) -> Cached<()> {
+        let dropped = guarded(|| {
+            let names = self.db.tree_names();
+            for name in names.iter().filter(|name| name.starts_with(begin.as_bytes())) {
+                self.db.drop_tree(name)?;
+            }
+            Ok(())
+        })?;
+        dropped.map_err(|error: ::sled::Error| error.to_string())
+    }
+
+    pub(in super::super) fn flush(&self) -> Cached<()> {
+        let flushed = guarded(|| self.db.flush())?;
+        flushed.map(|_| ()).map_err(|error| error.to_string())
+    }
+}
+
 impl Cache for SledCache {
     fn replace(&self, shelf: &str, prefix: &[u8], entries: Vec<(Vec<u8>, Vec<u8>)>) -> Cached<()> {
         let replaced = guarded(|| {

@@ -8,6 +8,7 @@ use super::read::{chunk_key, chunks};
 use crate::events::{Durable, Head};
 use crate::ids::{StreamId, TenantId};
 use crate::limits::{COMMIT_GROUP_BYTES_MAX, COMMIT_GROUP_MAX};
+use crate::sabotage;
 use crate::store::heads::HeadsFile;
 use crate::store::log::Promise;
 use crate::store::quiet::guarded;
@@ -75,6 +76,7 @@ impl Committer {
             return;
         }
         let Group { writes, heads, kept } = self.gather(jobs);
+        sabotage::point("committer");
         match self.make_durable(writes, &heads) {
             Ok(()) => {
                 self.publish(heads);

@@ -3,7 +3,7 @@ use super::super::quiet::guarded;
 use super::super::{DataKey, Walk};
 use super::sentence;
 use crate::events::{Head, Record};
-use crate::ids::{Seq, StreamKey};
+use crate::ids::{Digest, Seq, StreamKey};
 use crate::limits::STORE_VALUE_BYTES_MAX;
 
 /// stream key (16) ‖ sequence number (8) ‖ chunk (2), big-endian.
@@ -90,29 +90,38 @@ pub(super) fn last_seqs(tree: &::sled::Tree) -> Result<Vec<(StreamKey, u64)>, St
     Ok(found)
 }
 
-/// The records of one stream, one in memory at a time. No lock is held between two of them, and
-/// records appended meanwhile are not shown.
-pub(super) struct Records {
+/// Checks all that needs no key, up to the record `end`.
+pub(super) fn walk(tree: &::sled::Tree, stream: StreamKey, end: Head) -> Result<Head, ReadError> {
+    let mut walk = Walk::after(stream, Head::EMPTY);
+    let mut frames = Frames::new(tree, &walk, end);
+    while walk.last().seq < end.seq {
+        let frame = frames.next(walk.last().next().get())?;
+        walk.step(&frame)?;
+    }
+    match walk.last() == end {
+        true => Ok(end),
+        false => Err(other_end(end, walk.last().digest)),
+    }
+}
+
+/// The framed records of one stream, one in memory at a time.
+struct Frames {
     values: ::sled::Iter,
     /// A value that was read and belongs to the next record.
     pending: Option<(::sled::IVec, ::sled::IVec)>,
-    key: DataKey,
-    walk: Walk,
     end: Head,
-    ended: bool,
 }
 
-impl Records {
-    /// From the record after `walk`'s last one to `end`.
-    pub(super) fn new(tree: &::sled::Tree, key: DataKey, walk: Walk, end: Head) -> Records {
+impl Frames {
+    fn new(tree: &::sled::Tree, walk: &Walk, end: Head) -> Frames {
         let stream = walk.stream();
         let first = chunk_key(stream, walk.last().next().get(), 0);
         let values = tree.range(first..=chunk_key(stream, end.seq, u16::MAX));
-        Records { values, pending: None, key, walk, end, ended: false }
+        Frames { values, pending: None, end }
     }
 
-    fn read_one(&mut self) -> Result<Record, ReadError> {
-        let seq = self.walk.last().next().get();
+    /// The frame of record `seq`, which is the next one.
+    fn next(&mut self, seq: u64) -> Result<Vec<u8>, ReadError> {
         let mut joiner = Joiner::default();
         loop {
             let entry = match self.pending.take() {
@@ -134,11 +143,39 @@ impl Records {
             let reason = format!("record {seq} of {} is missing", self.end.seq);
             return Err(ReadError::Store { reason });
         }
-        let record = self.walk.open(&self.key, &joiner.frame)?;
+        Ok(joiner.frame)
+    }
+}
+
+fn other_end(end: Head, found: Digest) -> ReadError {
+    let (expected, found) = (end.digest.to_hex(), found.to_hex());
+    let reason = format!("the stream's head has the digest {expected}, this is {found}");
+    ReadError::Seal { seq: end.seq, reason }
+}
+
+/// The records of one stream, one in memory at a time. No lock is held between two of them, and
+/// records appended meanwhile are not shown.
+pub(super) struct Records {
+    frames: Frames,
+    key: DataKey,
+    walk: Walk,
+    end: Head,
+    ended: bool,
+}
+
+impl Records {
+    /// From the record after `walk`'s last one to `end`.
+    pub(super) fn new(tree: &::sled::Tree, key: DataKey, walk: Walk, end: Head) -> Records {
+        let frames = Frames::new(tree, &walk, end);
+        Records { frames, key, walk, end, ended: false }
+    }
+
+    fn read_one(&mut self) -> Result<Record, ReadError> {
+        let seq = self.walk.last().next().get();
+        let frame = self.frames.next(seq)?;
+        let record = self.walk.open(&self.key, &frame)?;
         if seq == self.end.seq && record.digest != self.end.digest {
-            let (expected, found) = (self.end.digest.to_hex(), record.digest.to_hex());
-            let reason = format!("the stream's head has the digest {expected}, this is {found}");
-            return Err(ReadError::Seal { seq, reason });
+            return Err(other_end(self.end, record.digest));
         }
         Ok(record)
     }

@@ -159,6 +159,10 @@ impl Domain for Household {
         polarity::contradiction(scene, words, program)
     }
 
+    fn unlike(&self, scene: &Scene, kind: &Symbol, word: &str) -> bool {
+        polarity::unlike(scene, kind, word)
+    }
+
     fn digest(&self, scene: &Scene) -> Digest {
         scene.digest()
     }

@@ -1,7 +1,8 @@
+use super::facts::Kind;
 use super::primitives::{Action, Bound, act};
 use super::scene::{Scene, State};
 use super::task::Task;
-use crate::language::Program;
+use crate::language::{Program, Symbol};
 
 /// Whether the words ask to turn on what is on, or off what is off. TOGGLE itself has no
 /// direction (the paper's primitive), so only the words can contradict the scene; and only when
@@ -40,4 +41,20 @@ fn wanted(words: &[String]) -> Option<bool> {
         (true, false) => Some(true),
         (false, false) => None,
     }
+}
+
+/// Whether all things of a type are in the state opposite to the one a word names. Nothing is known
+/// of a thing that is in neither, such as one that is neither hot nor cold: "the cooked potato".
+pub(super) fn unlike(scene: &Scene, kind: &Symbol, word: &str) -> bool {
+    const OPPOSITES: [(&[&str], State); 3] = [
+        (&["clean", "cleaned", "washed", "rinsed"], State::Dirty),
+        (&["cold", "chilled", "cooled"], State::Hot),
+        (&["hot", "heated", "warm", "warmed"], State::Cold),
+    ];
+    let Some((_, opposite)) = OPPOSITES.iter().find(|(words, _)| words.contains(&word)) else {
+        return false;
+    };
+    let Some(kind) = Kind::named(kind.as_str()) else { return false };
+    let mut things = scene.of(kind).peekable();
+    things.peek().is_some() && things.all(|index| scene.object(index).is(*opposite))
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::facts::{Room, facts};
+use super::facts::{Kind, Room, facts};
 use super::refusal::does_not_go;
 use super::scene::{Index, Object, Robot, Scene, State};
 use super::words::a;
@@ -100,8 +100,7 @@ fn read(text: SceneText) -> Result<Scene, String> {
     let (x, y) = text.robot.at;
     let robot = Robot { x, y, at: None, holds: None };
     let mut scene = Scene { room, robot, objects };
-    let names: BTreeMap<String, Index> =
-        (0..scene.objects.len() as Index).map(|index| (scene.name(index), index)).collect();
+    let names = names(&scene);
     let find = |name: &Option<String>| match name {
         None => Ok(None),
         Some(name) => names
@@ -116,6 +115,22 @@ fn read(text: SceneText) -> Result<Scene, String> {
     scene.robot.holds = find(&text.robot.holds)?;
     scene.check()?;
     Ok(scene)
+}
+
+/// [`Scene::name`] of everything, counted once and not once for each thing.
+fn names(scene: &Scene) -> BTreeMap<String, Index> {
+    let mut of_kind = BTreeMap::<Kind, u16>::new();
+    scene.objects.iter().for_each(|object| *of_kind.entry(object.kind).or_default() += 1);
+    let mut seen = BTreeMap::<Kind, u16>::new();
+    let numbered = (0..).zip(&scene.objects).map(|(index, object)| {
+        let number = seen.entry(object.kind).or_default();
+        *number += 1;
+        match of_kind[&object.kind] {
+            1 => (object.kind.name().to_owned(), index),
+            _ => (format!("{} {number}", object.kind), index),
+        }
+    });
+    numbered.collect()
 }
 
 impl Scene {
@@ -147,6 +162,23 @@ impl Scene {
                 Err(format!("the robot cannot stand at the {}", self.name(at)))
             }
             _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::household::Household;
+    use crate::world::{Domain, Stage};
+
+    #[test]
+    fn names_counted_once_are_those_counted_one_by_one() {
+        for seed in 1..20 {
+            let (scene, _) = Household::new().stage(&Stage::Seed { seed }).unwrap();
+            let one_by_one: BTreeMap<String, Index> =
+                (0..scene.objects.len() as Index).map(|index| (scene.name(index), index)).collect();
+            assert_eq!(names(&scene), one_by_one, "seed {seed}");
         }
     }
 }

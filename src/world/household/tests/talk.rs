@@ -54,6 +54,18 @@ fn turning_off_what_is_off_contradicts_the_scene() {
 }
 
 #[test]
+fn a_dirty_mug_is_no_clean_mug_and_of_others_nothing_is_said() {
+    let (household, mut scene, task) = kitchen("clean Mug DiningTable");
+    let mug = Symbol::new("Mug");
+    assert!(household.unlike(&scene, &mug, "clean"));
+    assert!(!household.unlike(&scene, &mug, "cold"));
+    assert!(!household.unlike(&scene, &mug, "blue"));
+    let wash = "GOTO Mug; PICKUP Mug; GOTO SinkBasin; PUT Mug SinkBasin; TOGGLE Faucet";
+    run(&household, &mut scene, &task, wash).unwrap();
+    assert!(!household.unlike(&scene, &mug, "clean"));
+}
+
+#[test]
 fn goals_progress_views_and_steps_read_as_sentences() {
     let (household, mut scene, task) = kitchen("cool Mug DiningTable closed");
     assert_eq!(

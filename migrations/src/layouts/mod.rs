@@ -1,0 +1,3 @@
+//! Data directories as released. Layout 2 is what lives.
+
+pub mod layout_1;

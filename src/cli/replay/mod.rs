@@ -1,0 +1,87 @@
+//! A person's session at any moment of its history.
+
+mod show;
+mod transcript;
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::Args;
+
+use super::failure::Failure;
+use super::{embedded, past};
+use crate::ids::{Seq, TenantId};
+use crate::replay::{self, Minds};
+use crate::world::household::Household;
+
+/// Rebuild a person's session as it stood at any moment.
+///
+/// The records are folded as when the person wakes, every checksum, chain and scene digest checked
+/// on the way, and the mind of that moment is trained again unless it is cached. The directory is
+/// copied first and stays as it is.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice replay --data lab --user ada
+  apprentice replay --data lab --user ada --at 17 --json | jq .mind_digest
+  apprentice replay --data lab --user ada --transcript > ada.txt && apprentice transcript check ada.txt
+
+docs/replay.md says what each digest covers.
+
+Exit codes: 0 the session was rebuilt; 1 the log and this program do not agree, and where; 2 the
+directory cannot be used, has no such tenant or user, or no such record.")]
+pub struct Arguments {
+    /// The data directory; it is copied first, and the copy is read
+    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The lab the person belongs to.
+    #[arg(long, value_name = "NAME", default_value = "local")]
+    tenant: String,
+    /// Whose session.
+    #[arg(long, value_name = "NAME")]
+    user: String,
+    /// Just after this record; the last one without it. `apprentice log show` numbers them.
+    #[arg(long, value_name = "SEQ")]
+    at: Option<u64>,
+    /// The history up to there in the notation of docs/transcripts.md.
+    #[arg(long, conflicts_with = "json")]
+    transcript: bool,
+    /// One JSON object with the whole state, without times and request ids.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
+    let user = embedded::user(&arguments.user)?;
+    let past = past::open(arguments.data)?;
+    let stream = past.stream(&tenant, &user)?;
+    let head = past.store.log.head(&stream).map_err(Failure::failed)?.seq;
+    let wanted = arguments.at.unwrap_or(head);
+    let at = Seq::new(wanted).filter(|at| at.get() <= head).ok_or_else(|| {
+        Failure::bad_input(format!(
+            "user {:?} in tenant {tenant} has records 1 to {head}, there is no record {wanted}; \
+             name one of them with --at",
+            user.as_str()
+        ))
+    })?;
+    let (domain, minds) = (Arc::new(Household::new()), Minds::default());
+    // From the first record on: a snapshot would save time and prove less.
+    let rebuilt = replay::rebuild_at(&domain, &past.store, &stream, &minds, at);
+    let session = rebuilt.map_err(Failure::failed)?;
+    let mut stdout = io::BufWriter::new(io::stdout().lock());
+    let written = if arguments.transcript {
+        let records = past.store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)?;
+        transcript::write(&mut stdout, &domain, records, &session)?
+    } else if arguments.json {
+        writeln!(stdout, "{}", show::json(&tenant, &session, head))
+    } else {
+        let lines = show::readable(&tenant, &session, head);
+        lines.iter().try_for_each(|line| writeln!(stdout, "{line}"))
+    };
+    written.and_then(|()| stdout.flush()).map_err(|error| {
+        Failure::failed(format!("the session cannot be written to standard output: {error}"))
+    })
+}

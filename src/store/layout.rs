@@ -1,0 +1,170 @@
+//! The layout of data directories, and how a directory of a former one is brought up: each step
+//! copies what changes into its new place beside the old one, then one rename of the file `LAYOUT`
+//! flips the number, and only then is the old place cleared. A crash at any moment leaves the old
+//! layout whole or the new one whole.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use apprentice_migrations::layouts::layout_1;
+
+use super::files::{sync_dir, write_whole};
+use super::models;
+use super::origin::Origin;
+use super::sled::SledCache;
+use super::{EventLog, Keys, OpenError, SledLog, cache};
+use crate::ids::{Digest, StreamId};
+
+/// The layout of data directories that this binary makes. Former ones are brought up.
+pub const LAYOUT: u32 = 2;
+
+pub(super) const LAYOUT_FILE: &str = "LAYOUT";
+/// Stands while a directory is being made; nothing was acknowledged yet.
+pub(super) const CREATING_FILE: &str = "CREATING";
+const LAYOUT_TEXT: &str = "apprentice data directory, layout ";
+
+/// What a directory is before it is opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// Still to be made.
+    Fresh,
+    /// A data directory of this layout, [`LAYOUT`] or a former one.
+    At(u32),
+}
+
+/// - errors: it belongs to somebody else, or to a newer version.
+pub(super) fn standing(dir: &Path) -> Result<Standing, OpenError> {
+    if dir.join(CREATING_FILE).exists() {
+        return Ok(Standing::Fresh);
+    }
+    let path = dir.join(LAYOUT_FILE);
+    let shown = || dir.display().to_string();
+    match fs::read(&path) {
+        Ok(bytes) => {
+            let text = std::str::from_utf8(&bytes).ok().and_then(|text| text.strip_suffix('\n'));
+            let number = text.and_then(|text| text.strip_prefix(LAYOUT_TEXT)?.parse().ok());
+            match number {
+                Some(known @ 1..=LAYOUT) => Ok(Standing::At(known)),
+                Some(found) if found > LAYOUT => Err(OpenError::Newer { dir: shown(), found }),
+                _ => Err(OpenError::Layout { dir: shown() }),
+            }
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let entries = fs::read_dir(dir).map_err(|error| failed(dir, dir, &error))?;
+            for entry in entries {
+                let name = entry.map_err(|error| failed(dir, dir, &error))?.file_name();
+                // A crash right at the start leaves these two.
+                if name != super::open::LOCK_FILE && name != "CREATING.new" {
+                    let found = format!("{:?}", name.to_string_lossy());
+                    return Err(OpenError::NotOurs { dir: shown(), found });
+                }
+            }
+            Ok(Standing::Fresh)
+        }
+        Err(error) => Err(failed(dir, &path, &error)),
+    }
+}
+
+/// Names the layout of `dir`, durably and in one step.
+pub(super) fn write_layout(dir: &Path, number: u32) -> Result<(), OpenError> {
+    let path = dir.join(LAYOUT_FILE);
+    write_whole(&path, format!("{LAYOUT_TEXT}{number}\n").as_bytes())
+        .and_then(|()| sync_dir(dir))
+        .map_err(|error| failed(dir, &path, &error))
+}
+
+fn failed(dir: &Path, path: &Path, error: &io::Error) -> OpenError {
+    let (dir, path) = (dir.display().to_string(), path.display().to_string());
+    OpenError::Io { dir, path, reason: error.to_string() }
+}
+
+/// A directory of a former layout whose log was opened and found whole.
+pub(super) struct Former<'a> {
+    pub dir: &'a Path,
+    pub log: &'a SledLog,
+    pub keys: &'a Keys,
+    pub cache: &'a SledCache,
+}
+
+/// Where a crash may fall between two things that a step does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Point {
+    Copied,
+    Flipped,
+}
+
+/// Brings a directory up from the layout `from`, one step for each number. `crash` is asked after
+/// each part of a step; only tests let it fail.
+pub(super) fn bring_up(
+    former: &Former<'_>,
+    from: u32,
+    mut crash: impl FnMut(Point) -> Result<(), OpenError>,
+) -> Result<(), OpenError> {
+    for number in from..LAYOUT {
+        tracing::info!(
+            dir = %former.dir.display(),
+            from = number,
+            to = number + 1,
+            "the data directory is brought up to a newer layout"
+        );
+        match number {
+            1 => former.copy_minds(),
+            _ => unreachable!("every layout from 1 on has a step above"),
+        }
+        crash(Point::Copied)?;
+        write_layout(former.dir, number + 1)?;
+        crash(Point::Flipped)?;
+    }
+    clear_former(former.cache);
+    Ok(())
+}
+
+impl Former<'_> {
+    /// 1 → 2: kept minds now say what made them. Layout 1 did not know, so they are copied as of
+    /// unknown origin: trained again when asked for, and still there should this code train them
+    /// differently. Snapshots fit no other version and are not copied.
+    ///
+    /// A cache may be lost at any time, so what cannot be copied is left behind with a word.
+    fn copy_minds(&self) {
+        let (mut copied, mut left) = (0, 0);
+        for tenant in self.log.tenants() {
+            let shelf = format!("{}{tenant}", layout_1::MINDS);
+            // Person by person, so that not all minds of a lab are in memory at once.
+            for stream in self.log.streams(&tenant).unwrap_or_default() {
+                let entries =
+                    cache::Cache::scan(self.cache, &shelf, &stream.key.0).unwrap_or_default();
+                for mind in layout_1::minds(entries) {
+                    match self.copy_mind(&stream, &mind) {
+                        Some(()) => copied += 1,
+                        None => left += 1,
+                    }
+                }
+            }
+        }
+        if let Err(reason) = self.cache.flush() {
+            tracing::warn!(%reason, "the copied minds may be lost and trained again");
+        }
+        tracing::info!(copied, left, "kept minds were copied");
+    }
+
+    fn copy_mind(&self, stream: &StreamId, mind: &layout_1::SealedMind) -> Option<()> {
+        let key = self.keys.user_key(stream).ok()?;
+        let bytes = key.open(&mind.bound(), &mind.sealed)?;
+        let digest = Digest(mind.digest);
+        let (place, blob) = (models::place(stream, digest), Origin::UNKNOWN.before(&bytes));
+        cache::put(self.cache, self.keys, stream, &place, &blob).ok()
+    }
+}
+
+/// Drops what former layouts kept. A crash may have come before it, so every opening asks.
+pub(super) fn clear_former(cache: &SledCache) {
+    for begin in [layout_1::MINDS, layout_1::SNAPSHOTS] {
+        if let Err(reason) = cache.drop_shelves(begin) {
+            tracing::warn!(%reason, "what a former layout kept stays behind");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
