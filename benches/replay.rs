@@ -217,7 +217,7 @@ fn main() {
     for (stream, mind) in
         few.iter().flat_map(|stream| diary.minds.iter().map(move |mind| (stream, mind)))
     {
-        keep_mind(&store, stream, &mind).expect("the cache takes it");
+        keep_mind(&store, stream, mind).expect("the cache takes it");
     }
     let (reproposed, counts) = timed(Scrutiny { retrain: false, repropose: true });
     println!(

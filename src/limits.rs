@@ -66,6 +66,10 @@ pub const COMMIT_GROUP_MAX: usize = 512;
 /// Bytes of the batches flushed together; a group ends with the batch that reaches it.
 pub const COMMIT_GROUP_BYTES_MAX: usize = 8 * 1024 * 1024;
 
+/// Seconds a group may take to become durable; then the log counts as hanging and is poisoned, in
+/// time for its clients to find the next process.
+pub const COMMIT_S_MAX: u64 = 15;
+
 /// Messages waiting in one user's mailbox; then an honest `Busy`.
 pub const MAILBOX_MAX: usize = 32;
 /// Requests waiting for one training to end; then an honest `Busy`.
@@ -97,6 +101,7 @@ const _: () = {
     assert!(RECORD_BYTES_MAX <= BATCH_BYTES_MAX);
     assert!(BATCH_BYTES_MAX <= COMMIT_QUEUE_BYTES_MAX);
     assert!((WAIT_S_MAX as u64) < CLIENT_RETRY_S_MAX);
+    assert!(2 * COMMIT_S_MAX < CLIENT_RETRY_S_MAX);
     assert!(WAITERS_MAX < MAILBOX_MAX);
     assert!(PROGRAM_STEPS_MAX <= EPISODE_ACTIONS_MAX);
 };

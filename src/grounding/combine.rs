@@ -1,9 +1,10 @@
 use super::arguments::Arguments;
 use super::moment::Moment;
+use super::purpose;
 use super::resolver::resolve;
 use super::settings::Execution;
 use crate::language::{
-    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Roles, Step, Symbol, Word,
+    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol, Word,
     WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
@@ -111,14 +112,17 @@ fn extend<D: Domain>(
         if whole.program.steps.is_empty() {
             return;
         }
-        let lists = ground.context.lists.is_some();
-        let purposes = ground.context.execution.purposes;
-        let reason = match lists && partial.literal {
-            true if undoes_itself(roles, &whole.program) => Some(
+        let steps = &whole.program.steps;
+        let literal = ground.context.lists.is_some() && partial.literal;
+        let reason = match literal {
+            true if purpose::undoes_itself(roles, steps) => Some(
                 "it would be taken again from where it was put, so it was put there for \
                  something that is not known",
             ),
-            true if purposes => beyond_steps(roles, &whole),
+            true if ground.context.execution.purposes => {
+                let forbidden = matches!(whole.verdict, Verdict::Forbidden { .. });
+                purpose::beyond_steps(roles, steps, whole.lifted.len(), forbidden)
+            }
             _ => None,
         };
         if let Some(reason) = reason {
@@ -381,60 +385,6 @@ fn further(distance: f32, penalty: f32) -> f32 {
     let factor = crate::numerics::exp(-0.5 * penalty);
     let kept = (1.0 - distance) * factor;
     distance / (distance + kept).max(f32::MIN_POSITIVE)
-}
-
-/// Whether something is taken twice, or put down and then taken, or gone to, again.
-fn undoes_itself(roles: &Roles, program: &Program) -> bool {
-    let mut moved: Vec<&Symbol> = Vec::new();
-    let mut placed: Vec<&Symbol> = Vec::new();
-    for step in &program.steps {
-        let Some(thing) = step.args.first() else { continue };
-        let takes = roles.takes(&step.operator);
-        let again = takes && moved.contains(&thing);
-        if again || (roles.goes(&step.operator) && placed.contains(&thing)) {
-            return true;
-        }
-        if takes || roles.puts(&step.operator) {
-            moved.push(thing);
-        }
-        if roles.puts(&step.operator) {
-            placed.push(thing);
-        }
-    }
-    false
-}
-
-/// Why several primitives in one utterance are a means to something that nobody named, if they are.
-///
-/// Whoever puts a thing somewhere and then turns something on, or works the same thing twice,
-/// wants what that does to the thing; the steps alone may stop half way. And several things to do
-/// that cannot be done as said were probably not meant as said.
-fn beyond_steps(roles: &Roles, whole: &Candidate) -> Option<&'static str> {
-    let steps = &whole.program.steps;
-    let works = |step: &&Step| {
-        let operator = &step.operator;
-        !roles.goes(operator)
-            && !roles.takes(operator)
-            && !roles.puts(operator)
-            && !roles.is_door(operator)
-    };
-    let put = steps.iter().position(|step| roles.puts(&step.operator));
-    let put_then_worked = put.is_some_and(|put| steps[put..].iter().any(|step| works(&step)));
-    let again = |place: usize, step: &Step| {
-        steps[..place].iter().any(|before| before.args == step.args && works(&before))
-    };
-    let worked_twice = steps.iter().enumerate().any(|(at, step)| works(&step) && again(at, step));
-    if put_then_worked || worked_twice {
-        return Some("what all of that together is for is not known");
-    }
-    let acts = steps.iter().filter(|step| !roles.goes(&step.operator)).count();
-    let handled = steps
-        .iter()
-        .filter(|step| !roles.goes(&step.operator) && !roles.is_door(&step.operator))
-        .count();
-    let forbidden = matches!(whole.verdict, Verdict::Forbidden { .. });
-    let several = whole.lifted.len() > 1 && (handled > 1 || acts > 2);
-    (forbidden && several).then_some("all of that together cannot be done as it was said")
 }
 
 /// Steps taken unasked before one step that needs them.

@@ -11,6 +11,7 @@ mod combine;
 mod interpret;
 mod moment;
 mod names;
+mod purpose;
 mod rerank_training;
 mod reranker;
 mod resolver;

@@ -1,7 +1,6 @@
 use super::bundle::{self, Bundle};
-use super::lift::lift;
 use super::parsing::AnyParser;
-use super::{Lesson, Recipe, Report, TrainError};
+use super::{Recipe, Report, TrainError};
 use crate::grounding::{Interpreter, Moment, Reranker};
 use crate::ids::Digest;
 use crate::language::{Answer, Exemplar, Utterance};
@@ -18,14 +17,6 @@ pub struct Mind {
     pub(super) seeds: u32,
     pub(super) report: Report,
     digest: Digest,
-}
-
-/// What a new lesson collides with.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Clash {
-    pub exemplar: Exemplar,
-    /// The 0-based index of the old lesson; none for a seed.
-    pub lesson: Option<usize>,
 }
 
 impl Mind {
@@ -134,22 +125,6 @@ impl Mind {
     pub fn exemplars(&self) -> Vec<(Exemplar, Option<usize>)> {
         let numbered = self.parser.exemplars().iter().enumerate();
         numbered.map(|(number, exemplar)| (exemplar.clone(), self.lesson_of(number))).collect()
-    }
-
-    /// Another program that the lesson's lifted form already stands for: the oldest exemplar that
-    /// says so. Two programs for one form cannot both be recalled.
-    pub fn clash<D: Domain>(
-        &self,
-        domain: &D,
-        lesson: &Lesson<D::Scene, D::Task>,
-    ) -> Option<Clash> {
-        let new = lift(domain, &self.recipe, lesson);
-        // Not the canonical programs: for the same words, "1 onto 2" and "2 onto 1" do collide.
-        let collides =
-            |old: &Exemplar| old.utterance == new.utterance && old.program != new.program;
-        let number = self.parser.exemplars().iter().position(collides)?;
-        let exemplar = self.parser.exemplars()[number].clone();
-        Some(Clash { exemplar, lesson: self.lesson_of(number) })
     }
 
     fn lesson_of(&self, number: usize) -> Option<usize> {

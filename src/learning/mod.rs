@@ -17,6 +17,6 @@ pub use code::{code_digest, mind_schema, pinned};
 pub use error::TrainError;
 pub use lesson::Lesson;
 pub use lift::lift;
-pub use mind::{Clash, Mind};
+pub use mind::Mind;
 pub use recipe::{Recipe, RecipeError, Report};
 pub use train::train;

@@ -15,11 +15,15 @@ pub(super) fn make_dir(dir: &Path) -> io::Result<()> {
     if dir.is_dir() {
         return Ok(());
     }
+    let parent = match dir.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    // One after the other: each new name is durable only with the directory above it.
+    make_dir(parent)?;
     fs::DirBuilder::new().recursive(true).mode(0o700).create(dir)?;
-    match dir.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => sync_dir(parent),
-        _ => sync_dir(Path::new(".")),
-    }
+    // Without the sync it may be gone after a power cut, so it must not be found next time.
+    sync_dir(parent).inspect_err(|_| drop(fs::remove_dir(dir)))
 }
 
 /// Puts `bytes` under `path`, all or nothing, readable by its owner only. Durable once the

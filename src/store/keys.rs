@@ -65,6 +65,12 @@ struct Held {
     erased: Vec<StreamId>,
 }
 
+/// A new key, and its file unless it is in memory.
+struct Made {
+    key: DataKey,
+    path: Option<PathBuf>,
+}
+
 impl std::fmt::Debug for Keys {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Keys(..)")
@@ -85,6 +91,12 @@ impl Keys {
             list(&users)?.iter().map(|tenant| list(tenant)).collect::<Result<Vec<_>, _>>()?
         {
             finish_erasures(&path)?;
+        }
+        // A process that died between giving a key its name and syncing the directory has left a
+        // key that looks as good as any other and would be gone after a power cut.
+        let tenants = list(&users)?;
+        for each in tenants.iter().map(PathBuf::as_path).chain([&*users, dir]) {
+            sync_dir(each).map_err(|error| cannot(each, &error))?;
         }
         let home = Home::Directory { dir: dir.to_owned(), writable: true };
         Ok(Keys { entropy, home, held: Mutex::default() })
@@ -220,17 +232,43 @@ impl Keys {
     /// - errors: [`KeyError::Erased`] when one of them was erased: its stream is final.
     pub fn make_user_keys(&self, streams: &[StreamId]) -> Result<(), KeyError> {
         let mut held = self.held();
+        let mut made = BTreeMap::new();
+        let durable = self.write_user_keys(&mut held, streams, &mut made);
+        for (stream, Made { key, path }) in made {
+            if durable.is_ok() {
+                self.keep(&mut held, &stream, key);
+            } else if let Some(path) = path {
+                // A key that may not outlive a power cut must not seal anything: the next attempt
+                // makes another.
+                held.users.remove(&stream);
+                let _ = fs::remove_file(path);
+            }
+        }
+        durable
+    }
+
+    /// - `made`: the keys that were written, whether or not all went well.
+    fn write_user_keys(
+        &self,
+        held: &mut Held,
+        streams: &[StreamId],
+        made: &mut BTreeMap<StreamId, Made>,
+    ) -> Result<(), KeyError> {
         let mut dirs = Vec::new();
         for stream in streams {
-            match self.find_user_key(&mut held, stream) {
+            if made.contains_key(stream) {
+                continue;
+            }
+            match self.find_user_key(held, stream) {
                 Ok(_) => continue,
                 Err(KeyError::Missing { .. }) => {}
                 Err(error) => return Err(error),
             }
             let key = DataKey::random(&*self.entropy);
+            let mut written = None;
             if let Home::Directory { .. } = self.home {
                 let path = user_path(self.writable()?, stream, "key");
-                let wrapped = self.wrapping_key(&mut held, &stream.tenant)?.seal(
+                let wrapped = self.wrapping_key(held, &stream.tenant)?.seal(
                     &*self.entropy,
                     &wrapping_bound(stream),
                     key.expose(),
@@ -241,8 +279,9 @@ impl Keys {
                     .and_then(|()| write_whole(&path, text.as_bytes()))
                     .map_err(|error| cannot(&path, &error))?;
                 dirs.push(dir);
+                written = Some(path);
             }
-            self.keep(&mut held, stream, key);
+            made.insert(stream.clone(), Made { key, path: written });
         }
         dirs.sort();
         dirs.dedup();

@@ -7,6 +7,7 @@ mod commit;
 mod read;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 pub(super) use self::adopt::Adopter;
 pub(super) use self::cache::SledCache;
@@ -16,21 +17,23 @@ pub(super) use self::read::{KEY_BYTES, chunk_key};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, OnceLock, RwLock};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use self::commit::{Committer, Job, Syncer};
 use self::read::{Records, frame_at, last_seqs};
+use self::watch::{InHand, Watch};
 use super::closed::{ClosedMark, Part};
-use super::heads::{Heads, HeadsFile};
+use super::heads::{Heads, HeadsFile, HeadsRead};
 use super::log::{Pending, ReadError};
 use super::quiet::guarded;
 use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
 use crate::events::{Batch, Head, Header, Record};
 use crate::ids::{Seq, StreamId, StreamKey, TenantId};
-use crate::limits::{COMMIT_QUEUE_BYTES_MAX, COMMIT_QUEUE_MAX};
+use crate::limits::{COMMIT_QUEUE_BYTES_MAX, COMMIT_QUEUE_MAX, COMMIT_S_MAX};
 
 /// Bytes of pages that `sled` keeps; it uses up to three times as much.
 const CACHE_BYTES: u64 = 64 * 1024 * 1024;
@@ -47,8 +50,12 @@ pub struct SledLog {
     shared: Arc<Shared>,
     sender: Option<SyncSender<Job>>,
     committer: Option<JoinHandle<()>>,
+    /// Disconnected when the committer has ended.
+    ended: Mutex<Receiver<()>>,
+    _watch: Watch,
     /// Left when the database is closed: fields are dropped in this order.
     mark: Option<ClosedMark>,
+    /// Held until all of that is done.
     _lock: Option<Arc<File>>,
 }
 
@@ -60,6 +67,9 @@ struct Shared {
     heads: RwLock<Heads>,
     poisoned: OnceLock<String>,
     waiting: Waiting,
+    in_hand: InHand,
+    /// A group was given up; the committer may never come back from it.
+    hangs: AtomicBool,
 }
 
 /// What stands in the committer's queue.
@@ -103,7 +113,8 @@ impl SledLog {
         lock: Arc<File>,
         leave_mark: bool,
     ) -> Result<SledLog, LogError> {
-        let mut log = SledLog::open_with(dir, keys, fresh, |path| {
+        let patience = Duration::from_secs(COMMIT_S_MAX);
+        let mut log = SledLog::open_with(dir, keys, fresh, patience, |path| {
             let file = OpenOptions::new().read(true).write(true).open(path)?;
             Ok(Box::new(move || file.sync_data()))
         })?;
@@ -123,16 +134,29 @@ impl SledLog {
         dir: &Path,
         keys: Arc<Keys>,
         fresh: bool,
+        patience: Duration,
         syncer: impl FnOnce(&Path) -> io::Result<Syncer>,
     ) -> Result<SledLog, LogError> {
         let database = dir.join("log");
+        let heads_path = dir.join("HEADS");
+        let recorded = HeadsFile::read(&heads_path).map_err(LogError::Io)?;
+        // Nothing was acknowledged by a directory whose making was interrupted, and its files may
+        // be half written, by a full disk for one: they are made anew. The heads file would know.
+        let nothing_known = |read: &HeadsRead| read.damage.is_none() && read.heads.is_empty();
+        let fresh = fresh && recorded.as_ref().is_none_or(nothing_known);
+        let recorded = match fresh {
+            true => None,
+            false => recorded,
+        };
+        if fresh && database.exists() {
+            std::fs::remove_dir_all(&database).map_err(LogError::Io)?;
+        }
         if !fresh && !database.join("db").is_file() {
             let missing = format!("{} is missing", database.join("db").display());
             return Err(LogError::Database(missing));
         }
         let db = open_database(&database, CACHE_BYTES).map_err(LogError::Database)?;
-        let heads_path = dir.join("HEADS");
-        let recorded = recorded_heads(dir, fresh)?;
+        let recorded = acknowledged(recorded, fresh)?;
         let heads = guarded(|| compare(&db, &recorded)).map_err(LogError::Database)??;
         // What sled holds beyond the recorded heads was never acknowledged. It is kept, and made
         // as durable as the rest before anybody reads it.
@@ -148,20 +172,22 @@ impl SledLog {
             heads: RwLock::new(heads),
             poisoned: OnceLock::new(),
             waiting: Waiting::default(),
+            in_hand: InHand::default(),
+            hangs: AtomicBool::new(false),
         });
         let (sender, receiver) = sync_channel(COMMIT_QUEUE_MAX);
+        let (ending, ended) = sync_channel(0);
         let committer = Committer::new(shared.clone(), heads_file, sync);
         let committer = std::thread::Builder::new()
             .name("committer".to_owned())
-            .spawn(move || committer.run(&receiver))
+            .spawn(move || {
+                let _ending = ending;
+                committer.run(&receiver);
+            })
             .map_err(LogError::Io)?;
-        Ok(SledLog {
-            shared,
-            sender: Some(sender),
-            committer: Some(committer),
-            mark: None,
-            _lock: None,
-        })
+        let _watch = Watch::start(shared.clone(), patience).map_err(LogError::Io)?;
+        let (sender, committer, ended) = (Some(sender), Some(committer), Mutex::new(ended));
+        Ok(SledLog { shared, sender, committer, ended, _watch, mark: None, _lock: None })
     }
 
     /// The sentence that poisoned the log, if one did.
@@ -174,14 +200,24 @@ impl Drop for SledLog {
     fn drop(&mut self) {
         // The committer answers what is waiting, then ends with its channel.
         self.sender = None;
-        if let Some(committer) = self.committer.take() {
-            // A committer that panicked has dropped its promises: everybody heard `Gone`.
-            let _ = committer.join();
+        let Some(committer) = self.committer.take() else { return };
+        const LOOK_AGAIN: Duration = Duration::from_millis(100);
+        let ended = self.ended.get_mut().unwrap_or_else(PoisonError::into_inner);
+        while ended.recv_timeout(LOOK_AGAIN) == Err(RecvTimeoutError::Timeout) {
+            if self.shared.hangs.load(Ordering::SeqCst) {
+                // Perhaps for ever, with the database. The directory stays locked until the
+                // process has ended.
+                std::mem::forget(self._lock.take());
+                if let Some(mark) = self.mark.take() {
+                    mark.forget();
+                }
+                return;
+            }
         }
-        if self.poisoned().is_some()
-            && let Some(mark) = self.mark.take()
-        {
-            // What failed may have left anything behind: no orderly end.
+        // A committer that panicked has dropped its promises: everybody heard `Gone`.
+        let orderly = committer.join().is_ok() && self.poisoned().is_none();
+        if !orderly && let Some(mark) = self.mark.take() {
+            // What failed may have left anything behind.
             mark.forget();
         }
     }
@@ -308,10 +344,10 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
     guarded(|| config.open())?.map_err(|error| sentence(&error))
 }
 
-/// What the heads file of `dir` says was acknowledged.
-fn recorded_heads(dir: &Path, fresh: bool) -> Result<Heads, LogError> {
+/// What a heads file says was acknowledged.
+fn acknowledged(read: Option<HeadsRead>, fresh: bool) -> Result<Heads, LogError> {
     let damaged = |reason| Err(LogError::Damaged(vec![Damage::Heads { reason }]));
-    match HeadsFile::read(&dir.join("HEADS")).map_err(LogError::Io)? {
+    match read {
         Some(read) => match read.damage {
             None => Ok(read.heads),
             Some(reason) => damaged(reason),

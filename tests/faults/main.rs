@@ -9,6 +9,7 @@ mod support;
 
 mod bounds;
 mod crash;
+mod disk;
 mod ledger;
 mod line;
 #[cfg(debug_assertions)]
@@ -94,5 +95,18 @@ fn power_cuts_in_a_namespace() {
         ] {
             assert!(count > 0, "no image had a {kind}");
         }
+    }
+}
+
+#[test]
+fn a_full_or_failing_disk_is_said_and_costs_no_acknowledgement() {
+    let (writes, syncs) = disk::calls();
+    println!("one small life has {writes} writes and {syncs} syncs");
+    for (kind, calls) in
+        [(disk::Kind::Full, writes), (disk::Kind::Write, writes), (disk::Kind::Sync, syncs)]
+    {
+        let counts = disk::fail_each(kind, calls);
+        println!("{kind:?}: {counts:?}; acknowledgements lost: 0");
+        assert!(counts.at_start > 0 && counts.under_way > 0, "{kind:?}: {counts:?}");
     }
 }

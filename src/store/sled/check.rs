@@ -1,11 +1,10 @@
 use std::path::Path;
 
 use super::super::quiet::guarded;
-use super::read::frame_at;
-use super::{CACHE_BYTES, Damage, LogError, TREE_PREFIX, compare, open_database, recorded_heads};
-use crate::events::Head;
+use super::read::walk;
+use super::{CACHE_BYTES, Damage, LogError, TREE_PREFIX, acknowledged, compare, open_database};
 use crate::ids::StreamId;
-use crate::store::Walk;
+use crate::store::heads::HeadsFile;
 
 /// Opens the database of `dir` and reads every record of it, without any key. It may write there:
 /// only for copies.
@@ -17,23 +16,21 @@ pub(in super::super) fn check_log(dir: &Path) -> Result<(), LogError> {
         return Err(LogError::Database("its file log/db is missing".to_owned()));
     }
     let db = open_database(&database, CACHE_BYTES).map_err(LogError::Database)?;
-    let recorded = recorded_heads(dir, false)?;
+    let recorded = HeadsFile::read(&dir.join("HEADS")).map_err(LogError::Io)?;
+    let recorded = acknowledged(recorded, false)?;
     let heads = guarded(|| compare(&db, &recorded)).map_err(LogError::Database)??;
     let mut damage = Vec::new();
     for (tenant, streams) in heads {
         let tree = guarded(|| db.open_tree(format!("{TREE_PREFIX}{tenant}")));
         let tree = tree.map_err(LogError::Database)?.map_err(super::database_error)?;
         for (key, head) in streams {
-            let mut walk = Walk::after(key, Head::EMPTY);
-            while walk.last().seq < head.seq {
-                let frame = guarded(|| frame_at(&tree, key, walk.last().next()));
-                let frame = frame.unwrap_or_else(|reason| Err(super::store_error(reason)));
-                let stepped = frame.and_then(|frame| walk.step(&frame).map(|_| ()));
-                if let Err(error) = stepped {
-                    let stream = StreamId { tenant: tenant.clone(), key };
-                    damage.push(Damage::Record { stream, error });
-                    break;
-                }
+            let walked = guarded(|| walk(&tree, key, head));
+            let walked = walked.unwrap_or_else(|reason| Err(super::store_error(reason)));
+            if let Err(error) = walked {
+                damage.push(Damage::Record {
+                    stream: StreamId { tenant: tenant.clone(), key },
+                    error,
+                });
             }
         }
     }

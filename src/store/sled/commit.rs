@@ -76,18 +76,24 @@ impl Committer {
             return;
         }
         let Group { writes, heads, kept } = self.gather(jobs);
+        let (promises, receipts): (Vec<Promise>, Vec<Durable>) = kept.into_iter().unzip();
+        let shared = self.shared.clone();
+        let hold = shared.in_hand.hold(promises);
         sabotage::point("committer");
-        match self.make_durable(writes, &heads) {
+        let durable = self.make_durable(writes, &heads);
+        // Too late: the log is poisoned, and everybody was told so.
+        let Some(promises) = hold.release() else { return };
+        match durable {
             Ok(()) => {
                 self.publish(heads);
-                for (promise, durable) in kept {
-                    let _ = promise.send(Ok(durable));
+                for (promise, receipt) in promises.into_iter().zip(receipts) {
+                    let _ = promise.send(Ok(receipt));
                 }
             }
             Err(reason) => {
                 let poisoned = AppendError::Poisoned { reason: reason.clone() };
                 self.shared.poison(reason);
-                for (promise, _) in kept {
+                for promise in promises {
                     let _ = promise.send(Err(poisoned.clone()));
                 }
             }

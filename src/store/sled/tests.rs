@@ -4,10 +4,14 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use super::super::conformance::{batch, read_all, stream};
 use super::super::{OpenError, OsEntropy, Store, open};
 use super::*;
+
+/// Longer than any group takes that does not hang.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A log in `dir` whose `fdatasync` is `sync`.
 fn log_with(
@@ -16,7 +20,7 @@ fn log_with(
     sync: impl FnMut() -> io::Result<()> + Send + 'static,
 ) -> (SledLog, Arc<Keys>) {
     let keys = Arc::new(Keys::open(&dir.join("keys"), Arc::new(OsEntropy)).unwrap());
-    let log = SledLog::open_with(dir, keys.clone(), fresh, |_| Ok(Box::new(sync)));
+    let log = SledLog::open_with(dir, keys.clone(), fresh, PATIENCE, |_| Ok(Box::new(sync)));
     (log.unwrap_or_else(|error| panic!("{error:?}")), keys)
 }
 
@@ -83,6 +87,49 @@ fn after_a_failed_sync_nothing_is_acknowledged_until_a_restart() {
     let found = read_all(&log, &ada);
     assert_eq!(found[..1], *kept.records());
     log.append(&ada, log.head(&ada).unwrap(), batch(["later"])).wait().unwrap();
+}
+
+#[test]
+fn a_commit_that_hangs_poisons_the_log_and_keeps_nobody_waiting() {
+    let dir = tempfile::tempdir().unwrap();
+    let keys = Arc::new(Keys::open(&dir.path().join("keys"), Arc::new(OsEntropy)).unwrap());
+    let (release, gate) = channel::<()>();
+    let mut opening = true;
+    let sync = move || {
+        if !std::mem::take(&mut opening) {
+            let _ = gate.recv();
+        }
+        Ok(())
+    };
+    let patience = Duration::from_millis(200);
+    let log = SledLog::open_with(dir.path(), keys.clone(), true, patience, |_| Ok(Box::new(sync)));
+    let log = log.unwrap_or_else(|error| panic!("{error:?}"));
+    let ada = stream(&keys, "local", "ada");
+    let hanging = log.append(&ada, Head::EMPTY, batch(["a"])).wait();
+    assert!(
+        matches!(&hanging, Err(AppendError::Poisoned { reason }) if reason.contains("200ms")),
+        "{hanging:?}"
+    );
+    let later = log.append(&ada, Head::EMPTY, batch(["b"])).wait();
+    assert!(matches!(later, Err(AppendError::Poisoned { .. })), "{later:?}");
+    // Neither is whoever closes it.
+    drop(log);
+    drop(release);
+}
+
+#[test]
+fn a_directory_whose_making_was_cut_short_is_made_anew() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("CREATING"), "").unwrap();
+    fs::create_dir(dir.path().join("log")).unwrap();
+    fs::write(dir.path().join("log/conf"), "").unwrap();
+    let store = open(dir.path()).unwrap();
+    fill(&store, &ada(&store), 3);
+    drop(store);
+    // It is not made anew when the heads know of records.
+    fs::write(dir.path().join("CREATING"), "").unwrap();
+    let store = open(dir.path()).unwrap();
+    assert_eq!(store.log.head(&ada(&store)).unwrap().seq, 3);
 }
 
 #[test]
