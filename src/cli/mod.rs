@@ -2,16 +2,20 @@
 
 mod args;
 mod audit;
+mod check_copy;
 mod converse;
 mod data_dir;
 mod embedded;
 mod eval;
+mod export;
 mod failure;
+mod import;
 mod log;
 mod logging;
 mod past;
 mod recipe;
 mod replay;
+mod salvage;
 mod self_test;
 mod serve;
 mod talk;
