@@ -4,7 +4,11 @@ use clap::{Parser, Subcommand};
 
 use super::failure::Failure;
 use super::logging::Logging;
-use super::{audit, converse, eval, log, replay, self_test, serve, talk, transcript};
+use super::{
+    audit, check_copy, converse, eval, export, import, log, replay, salvage, self_test, serve,
+    talk, transcript,
+};
+use crate::store;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -19,6 +23,7 @@ Examples:
   apprentice log show --data demo --user you
   apprentice replay --data demo --user you --at 17
   apprentice audit --data demo --repropose --retrain
+  apprentice salvage --data demo --out rescued
 
 Exit codes:
   0  fine; the end of input is fine too
@@ -51,6 +56,11 @@ enum Verb {
     Replay(replay::Arguments),
     Audit(audit::Arguments),
     SelfTest(self_test::Arguments),
+    Salvage(salvage::Arguments),
+    Export(export::Arguments),
+    Import(import::Arguments),
+    #[command(hide = true)]
+    CheckCopy(check_copy::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit code.
@@ -63,6 +73,12 @@ pub fn main() -> ExitCode {
 }
 
 fn run(arguments: CommandLine) -> Result<(), Failure> {
+    if let Some(Verb::CheckCopy(arguments)) = arguments.command {
+        return check_copy::run(&arguments);
+    }
+    if let Ok(program) = std::env::current_exe() {
+        store::check_with(program);
+    }
     // Who serves others wants to see that it runs; who talks wants to see the conversation.
     let filter = match arguments.command {
         Some(Verb::Serve(_)) => "info",
@@ -79,6 +95,10 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Replay(arguments)) => replay::run(arguments),
         Some(Verb::Audit(arguments)) => audit::run(arguments),
         Some(Verb::SelfTest(arguments)) => self_test::run(arguments),
+        Some(Verb::Salvage(arguments)) => salvage::run(arguments),
+        Some(Verb::Export(arguments)) => export::run(arguments),
+        Some(Verb::Import(arguments)) => import::run(arguments),
+        Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }
 }
 

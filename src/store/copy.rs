@@ -3,6 +3,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::check;
 use super::files::make_dir;
 use super::layout::{Former, LAYOUT, LAYOUT_FILE, Standing, bring_up, standing};
 use super::open::{lock_existing, open_log};
@@ -35,14 +36,18 @@ pub fn copy_private(dir: &Path) -> Result<PrivateCopy, OpenError> {
     let copied = make_dir(&copy.dir)
         .and_then(|()| fs::copy(dir.join(LAYOUT_FILE), copy.dir.join(LAYOUT_FILE)).map(|_| ()))
         .and_then(|()| copy_tree(&dir.join("log"), &copy.dir.join("log")))
-        .and_then(|()| match dir.join("cache").is_dir() {
+        .and_then(|_| match dir.join("cache").is_dir() {
             true => copy_tree(&dir.join("cache"), &copy.dir.join("cache")),
-            false => Ok(()),
+            false => Ok(0),
         })
-        .and_then(|()| match fs::copy(dir.join("HEADS"), copy.dir.join("HEADS")) {
-            // That is for the opening to report.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            copied => copied.map(|_| ()),
+        .and_then(|_| {
+            ["HEADS", "CLOSED-log", "CLOSED-cache"].iter().try_for_each(|name| {
+                match fs::copy(dir.join(name), copy.dir.join(name)) {
+                    // That is for the opening to report.
+                    Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+                    copied => copied.map(|_| ()),
+                }
+            })
         });
     copied.map_err(|error| OpenError::Io {
         dir: dir.display().to_string(),
@@ -77,8 +82,14 @@ impl PrivateCopy {
     /// The store of the copy, its cached minds included; new people cannot be added to it. A copy of
     /// a former layout is brought up; its original is not.
     ///
-    /// Errors name the directory that was copied.
+    /// Errors name the directory that was copied: the copy is gone when they are read.
     pub fn open(&self) -> Result<Store, OpenError> {
+        self.open_copy().map_err(|error| error.about(&self.of))
+    }
+
+    fn open_copy(&self) -> Result<Store, OpenError> {
+        check::log_before_opening(&self.dir)?;
+        check::cache_before_opening(&self.dir);
         let lock = self.dir.join("LOCK");
         let lock = fs::File::create(&lock).map_err(|error| OpenError::Io {
             dir: self.dir.display().to_string(),
@@ -90,26 +101,15 @@ impl PrivateCopy {
         let keys = Arc::new(keys);
         let lock = Arc::new(lock);
         let from = standing(&self.dir)?;
-        let log = open_log(&self.dir, keys.clone(), false, lock.clone());
-        let log = log.map_err(|error| self.said_of_the_original(error))?;
+        let log = open_log(&self.dir, keys.clone(), false, lock.clone(), false)?;
         let cache = SledCache::open(&self.dir.join("cache"), lock).map_err(|reason| {
-            self.said_of_the_original(OpenError::Database { dir: String::new(), reason })
+            OpenError::Database { dir: self.dir.display().to_string(), reason }
         })?;
         if let Standing::At(from @ 1..LAYOUT) = from {
             let former = Former { dir: &self.dir, log: &log, keys: &keys, cache: &cache };
             bring_up(&former, from, |_| Ok(()))?;
         }
         Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
-    }
-
-    /// What is wrong with the copy is wrong with the original.
-    fn said_of_the_original(&self, error: OpenError) -> OpenError {
-        let dir = self.of.display().to_string();
-        match error {
-            OpenError::Database { reason, .. } => OpenError::Database { dir, reason },
-            OpenError::Damaged { damage, .. } => OpenError::Damaged { dir, damage },
-            other => other,
-        }
     }
 }
 
@@ -121,15 +121,19 @@ impl Drop for PrivateCopy {
     }
 }
 
-fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
+/// Copies a directory with all that is in it.
+///
+/// - returns: the bytes copied.
+pub(super) fn copy_tree(from: &Path, to: &Path) -> io::Result<u64> {
+    let mut bytes = 0;
     make_dir(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
         let (source, target) = (entry.path(), to.join(entry.file_name()));
-        match entry.file_type()?.is_dir() {
+        bytes += match entry.file_type()?.is_dir() {
             true => copy_tree(&source, &target)?,
-            false => fs::copy(&source, &target).map(|_| ())?,
-        }
+            false => fs::copy(&source, &target)?,
+        };
     }
-    Ok(())
+    Ok(bytes)
 }

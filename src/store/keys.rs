@@ -108,6 +108,78 @@ impl Keys {
         Keys { entropy, home, held: Mutex::default() }
     }
 
+    /// The keys of one tenant whose secret stands somewhere else than in a data directory.
+    ///
+    /// - `secret`: the text of its key file.
+    pub(super) fn of_secret(
+        tenant: &TenantId,
+        secret: &[u8],
+        path: &Path,
+        entropy: Arc<dyn Entropy>,
+    ) -> Result<Keys, KeyError> {
+        let text = std::str::from_utf8(secret).map_err(|_| malformed(path, "it is no text"))?;
+        let keys = Keys::in_memory(entropy);
+        keys.held().tenants.insert(tenant.clone(), tenant_key_of(text, path)?);
+        Ok(keys)
+    }
+
+    /// Opens the bytes of a person's key file.
+    pub(super) fn unwrap(
+        &self,
+        stream: &StreamId,
+        file: &[u8],
+        path: &Path,
+    ) -> Result<DataKey, KeyError> {
+        self.unwrapped(&mut self.held(), stream, file, path)
+    }
+
+    fn unwrapped(
+        &self,
+        held: &mut Held,
+        stream: &StreamId,
+        file: &[u8],
+        path: &Path,
+    ) -> Result<DataKey, KeyError> {
+        let wrapped = std::str::from_utf8(file)
+            .ok()
+            .and_then(|text| text.strip_prefix(KEY_FILE_HEAD))
+            .and_then(|rest| unhex(rest.trim_end()))
+            .ok_or_else(|| malformed(path, "it does not hold a wrapped key"))?;
+        let opened = self
+            .wrapping_key(held, &stream.tenant)?
+            .open(&wrapping_bound(stream), &wrapped)
+            .map(Zeroizing::new)
+            .ok_or_else(|| malformed(path, "the tenant's key does not open it"))?;
+        let bytes: &[u8; 32] = opened
+            .as_slice()
+            .try_into()
+            .map_err(|_| malformed(path, "it does not hold a key of 32 bytes"))?;
+        Ok(DataKey::from_bytes(*bytes))
+    }
+
+    /// Whether the tenant's secret is the one that wrapped the keys of these people. Damage that
+    /// turns it into another secret would make everybody a stranger without a word.
+    ///
+    /// - errors: none of the keys that are there opens.
+    pub fn check_opens(&self, tenant: &TenantId, streams: &[StreamId]) -> Result<(), KeyError> {
+        let Home::Directory { dir, .. } = &self.home else { return Ok(()) };
+        let mut seen = None;
+        for stream in streams {
+            match self.user_key(stream) {
+                Ok(_) => return Ok(()),
+                Err(KeyError::Malformed { .. }) => seen = Some(()),
+                Err(_) => {}
+            }
+        }
+        match seen {
+            None => Ok(()),
+            Some(()) => Err(malformed(
+                &tenant_path(dir, tenant),
+                "it opens the key of nobody in this directory",
+            )),
+        }
+    }
+
     pub fn entropy(&self) -> &dyn Entropy {
         &*self.entropy
     }
@@ -282,27 +354,14 @@ impl Keys {
             return Err(KeyError::Erased { stream: stream.clone() });
         }
         let path = user_path(dir, stream, "key");
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
+        let file = match fs::read(&path) {
+            Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 return Err(KeyError::Missing { stream: stream.clone(), path: show(&path) });
             }
             Err(error) => return Err(cannot(&path, &error)),
         };
-        let wrapped = text
-            .strip_prefix(KEY_FILE_HEAD)
-            .and_then(|rest| unhex(rest.trim_end()))
-            .ok_or_else(|| malformed(&path, "it does not hold a wrapped key"))?;
-        let opened = self
-            .wrapping_key(held, &stream.tenant)?
-            .open(&wrapping_bound(stream), &wrapped)
-            .map(Zeroizing::new)
-            .ok_or_else(|| malformed(&path, "the tenant's key does not open it"))?;
-        let bytes: &[u8; 32] = opened
-            .as_slice()
-            .try_into()
-            .map_err(|_| malformed(&path, "it does not hold a key of 32 bytes"))?;
-        let key = DataKey::from_bytes(*bytes);
+        let key = self.unwrapped(held, stream, &file, &path)?;
         self.keep(held, stream, key.clone());
         Ok(key)
     }
@@ -319,6 +378,11 @@ impl Keys {
 
 fn tenant_path(dir: &Path, tenant: &TenantId) -> PathBuf {
     dir.join(format!("{tenant}.key"))
+}
+
+/// Where a person's wrapped key stands below the directory of keys.
+pub(super) fn user_file(stream: &StreamId) -> PathBuf {
+    user_path(Path::new(""), stream, "key")
 }
 
 fn user_path(dir: &Path, stream: &StreamId, extension: &str) -> PathBuf {
@@ -345,6 +409,10 @@ fn read_tenant_key(path: &Path, tenant: &TenantId) -> Result<DataKey, KeyError> 
     if mode & 0o077 != 0 {
         return Err(KeyError::Permissions { path: show(path), mode: mode & 0o777 });
     }
+    tenant_key_of(&text, path)
+}
+
+fn tenant_key_of(text: &str, path: &Path) -> Result<DataKey, KeyError> {
     let bytes = unhex(text.trim_end()).map(Zeroizing::new).unwrap_or_default();
     let bytes: &[u8; 32] = bytes
         .as_slice()

@@ -1,14 +1,18 @@
 //! Where bytes outlive processes: the ports for durable things, and their adapters.
 
 mod cache;
+mod check;
 mod checks;
+mod closed;
 pub mod conformance;
 mod copy;
 mod drill;
 mod entropy;
+mod export;
 mod faulty;
 mod files;
 mod heads;
+mod import;
 mod keys;
 mod layout;
 mod log;
@@ -17,13 +21,18 @@ mod models;
 mod open;
 mod origin;
 mod quiet;
+mod rescue;
+mod salvage;
 mod sealing;
 mod sled;
 mod snapshots;
 
+pub use self::check::{CHECK_COMMAND, check_copy, check_with};
 pub use self::copy::{PrivateCopy, copy_private};
 pub use self::entropy::{Entropy, OsEntropy, SeededEntropy};
+pub use self::export::{ExportError, Exported, export, key_file_of};
 pub use self::faulty::{Fault, FaultPlan, FaultyLog};
+pub use self::import::{ImportError, Imported, import};
 pub use self::keys::{KeyError, Keys};
 pub use self::layout::LAYOUT;
 pub use self::log::{AppendError, EventLog, Pending, ReadError};
@@ -31,6 +40,8 @@ pub use self::memory::MemoryLog;
 pub use self::models::ModelStore;
 pub use self::open::{OpenError, Store, open, open_memory};
 pub use self::origin::{CacheCounter, CacheCounts, Found, Origin};
+pub use self::rescue::{Loss, RescueError, StreamFound};
+pub use self::salvage::{SalvageError, Salvaged, salvage};
 pub use self::sealing::{DataKey, Draft, Sealed, Walk};
 pub use self::sled::{Damage, SledLog};
 pub use self::snapshots::SnapshotStore;

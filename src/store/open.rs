@@ -4,7 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::cache::{Cache, MemoryCache};
+use super::check;
+use super::closed::Part;
 use super::files::{make_dir, sync_dir, write_whole};
+use super::import;
 use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
 use super::sled::{LogError, SledCache};
 use super::{
@@ -54,14 +57,29 @@ pub enum OpenError {
     Key { dir: String, error: KeyError },
     #[error(
         "the database in the data directory {dir} is damaged and does not open ({reason}); \
-         restore the directory from a backup"
+         restore the directory from a backup, or rescue what can be read with \
+         `apprentice salvage --data {dir} --out NEW`"
     )]
     Database { dir: String, reason: String },
     #[error(
-        "the data directory {dir} has lost records: {}; restore it from a backup",
+        "the data directory {dir} has lost records: {}; restore it from a backup, or rescue what is \
+         left with `apprentice salvage --data {dir} --out NEW`",
         list(damage)
     )]
     Damaged { dir: String, damage: Vec<Damage> },
+}
+
+impl OpenError {
+    /// The same error about the directory of which another one is a copy.
+    pub(super) fn about(self, original: &Path) -> OpenError {
+        let dir = original.display().to_string();
+        match self {
+            OpenError::Database { reason, .. } => OpenError::Database { dir, reason },
+            OpenError::Damaged { damage, .. } => OpenError::Damaged { dir, damage },
+            OpenError::Key { error, .. } => OpenError::Key { dir, error },
+            other => other,
+        }
+    }
 }
 
 fn list(damage: &[Damage]) -> String {
@@ -87,7 +105,15 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
     }
     let keys = Keys::open(&dir.join("keys"), Arc::new(OsEntropy)).map_err(|e| fail.key(e))?;
     let keys = Arc::new(keys);
-    let log = open_log(dir, keys.clone(), fresh, lock.clone())?;
+    if !fresh {
+        check::log_before_opening(dir)?;
+        import::settle_before_opening(dir)?;
+        check::cache_before_opening(dir);
+    }
+    for part in [Part::Log, Part::Cache] {
+        part.lift_mark(dir).map_err(|e| fail.io(dir, &e))?;
+    }
+    let log = open_log(dir, keys.clone(), fresh, lock.clone(), true)?;
     let local = TenantId::local();
     let local_is_empty = log.streams(&local).is_ok_and(|streams| streams.is_empty());
     if local_is_empty {
@@ -95,7 +121,10 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
     }
     log.tenants()
         .iter()
-        .try_for_each(|tenant| keys.check_tenant(tenant))
+        .try_for_each(|tenant| {
+            keys.check_tenant(tenant)?;
+            keys.check_opens(tenant, &log.streams(tenant).unwrap_or_default())
+        })
         .map_err(|e| fail.key(e))?;
     let cache =
         SledCache::open(&dir.join("cache"), lock).map_err(|reason| fail.database(reason))?;
@@ -155,9 +184,10 @@ pub(super) fn open_log(
     keys: Arc<Keys>,
     fresh: bool,
     lock: Arc<File>,
+    leave_mark: bool,
 ) -> Result<SledLog, OpenError> {
     let fail = Fail(dir);
-    SledLog::open(dir, keys, fresh, lock).map_err(|error| match error {
+    SledLog::open(dir, keys, fresh, lock, leave_mark).map_err(|error| match error {
         LogError::Io(error) => fail.io(&dir.join("log"), &error),
         LogError::Database(reason) => fail.database(reason),
         LogError::Damaged(damage) => OpenError::Damaged { dir: fail.dir(), damage },

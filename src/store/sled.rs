@@ -1,13 +1,18 @@
 //! The log on `sled`: one tree per tenant, one committer, group commit.
 
+mod adopt;
 mod cache;
+mod check;
 mod commit;
 mod read;
 #[cfg(test)]
 mod tests;
 mod watch;
 
+pub(super) use self::adopt::Adopter;
 pub(super) use self::cache::SledCache;
+pub(super) use self::check::{check_cache, check_log};
+pub(super) use self::read::{KEY_BYTES, chunk_key};
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -21,6 +26,7 @@ use std::time::Duration;
 use self::commit::{Committer, Job, Syncer};
 use self::read::{Records, frame_at, last_seqs};
 use self::watch::{InHand, Watch};
+use super::closed::{ClosedMark, Part};
 use super::heads::{Heads, HeadsFile, HeadsRead};
 use super::log::{Pending, ReadError};
 use super::quiet::guarded;
@@ -47,7 +53,9 @@ pub struct SledLog {
     /// Disconnected when the committer has ended.
     ended: Mutex<Receiver<()>>,
     _watch: Watch,
-    /// Held until the database is closed: fields are dropped in this order.
+    /// Left when the database is closed: fields are dropped in this order.
+    mark: Option<ClosedMark>,
+    /// Held until all of that is done.
     _lock: Option<Arc<File>>,
 }
 
@@ -83,6 +91,9 @@ pub enum Damage {
     Record { stream: StreamId, error: ReadError },
     #[error("the heads file, which guards against lost records, is damaged: {reason}")]
     Heads { reason: String },
+    /// What a check of a copy saw and said.
+    #[error("{0}")]
+    Seen(String),
 }
 
 /// Why a log cannot be opened; `super::open` adds the directory and what to do.
@@ -100,6 +111,7 @@ impl SledLog {
         keys: Arc<Keys>,
         fresh: bool,
         lock: Arc<File>,
+        leave_mark: bool,
     ) -> Result<SledLog, LogError> {
         let patience = Duration::from_secs(COMMIT_S_MAX);
         let mut log = SledLog::open_with(dir, keys, fresh, patience, |path| {
@@ -107,6 +119,7 @@ impl SledLog {
             Ok(Box::new(move || file.sync_data()))
         })?;
         log._lock = Some(lock);
+        log.mark = leave_mark.then(|| ClosedMark::new(dir, Part::Log));
         Ok(log)
     }
 
@@ -143,17 +156,7 @@ impl SledLog {
             return Err(LogError::Database(missing));
         }
         let db = open_database(&database, CACHE_BYTES).map_err(LogError::Database)?;
-        let recorded = match (recorded, fresh) {
-            (Some(read), _) => match read.damage {
-                None => read.heads,
-                Some(reason) => return Err(LogError::Damaged(vec![Damage::Heads { reason }])),
-            },
-            (None, true) => Heads::new(),
-            (None, false) => {
-                let reason = format!("{} is missing", heads_path.display());
-                return Err(LogError::Damaged(vec![Damage::Heads { reason }]));
-            }
-        };
+        let recorded = acknowledged(recorded, fresh)?;
         let heads = guarded(|| compare(&db, &recorded)).map_err(LogError::Database)??;
         // What sled holds beyond the recorded heads was never acknowledged. It is kept, and made
         // as durable as the rest before anybody reads it.
@@ -184,7 +187,7 @@ impl SledLog {
             .map_err(LogError::Io)?;
         let _watch = Watch::start(shared.clone(), patience).map_err(LogError::Io)?;
         let (sender, committer, ended) = (Some(sender), Some(committer), Mutex::new(ended));
-        Ok(SledLog { shared, sender, committer, ended, _watch, _lock: None })
+        Ok(SledLog { shared, sender, committer, ended, _watch, mark: None, _lock: None })
     }
 
     /// The sentence that poisoned the log, if one did.
@@ -205,11 +208,18 @@ impl Drop for SledLog {
                 // Perhaps for ever, with the database. The directory stays locked until the
                 // process has ended.
                 std::mem::forget(self._lock.take());
+                if let Some(mark) = self.mark.take() {
+                    mark.forget();
+                }
                 return;
             }
         }
         // A committer that panicked has dropped its promises: everybody heard `Gone`.
-        let _ = committer.join();
+        let orderly = committer.join().is_ok() && self.poisoned().is_none();
+        if !orderly && let Some(mark) = self.mark.take() {
+            // What failed may have left anything behind.
+            mark.forget();
+        }
     }
 }
 
@@ -320,7 +330,7 @@ impl Shared {
 
     fn tree(&self, tenant: &TenantId) -> Result<::sled::Tree, ReadError> {
         let name = format!("{TREE_PREFIX}{tenant}");
-        self.db.open_tree(name).map_err(|error| store_error(error.to_string()))
+        self.db.open_tree(name).map_err(|error| store_error(sentence(&error)))
     }
 }
 
@@ -331,7 +341,20 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
         .cache_capacity(cache_bytes)
         // Background flushing would give "durable" a second meaning.
         .flush_every_ms(None);
-    guarded(|| config.open())?.map_err(|error| error.to_string())
+    guarded(|| config.open())?.map_err(|error| sentence(&error))
+}
+
+/// What a heads file says was acknowledged.
+fn acknowledged(read: Option<HeadsRead>, fresh: bool) -> Result<Heads, LogError> {
+    let damaged = |reason| Err(LogError::Damaged(vec![Damage::Heads { reason }]));
+    match read {
+        Some(read) => match read.damage {
+            None => Ok(read.heads),
+            Some(reason) => damaged(reason),
+        },
+        None if fresh => Ok(Heads::new()),
+        None => damaged("the file HEADS is missing".to_owned()),
+    }
 }
 
 /// Compares what the database holds with what was acknowledged.
@@ -418,7 +441,7 @@ impl Damage {
     pub fn stream(&self) -> Option<&StreamId> {
         match self {
             Damage::LostTail { stream, .. } | Damage::Record { stream, .. } => Some(stream),
-            Damage::Heads { .. } => None,
+            Damage::Heads { .. } | Damage::Seen(_) => None,
         }
     }
 }
@@ -428,5 +451,14 @@ fn store_error(reason: String) -> ReadError {
 }
 
 fn database_error(error: ::sled::Error) -> LogError {
-    LogError::Database(error.to_string())
+    LogError::Database(sentence(&error))
+}
+
+/// An error of the database for an operator.
+fn sentence(error: &::sled::Error) -> String {
+    match error {
+        ::sled::Error::Corruption { .. } => "a page does not fit its checksum".to_owned(),
+        ::sled::Error::Io(error) => error.to_string(),
+        other => other.to_string(),
+    }
 }

@@ -2,6 +2,8 @@
 
 mod show;
 
+pub use show::json;
+
 use std::io::Write;
 
 use clap::{Args, Subcommand};
@@ -51,7 +53,7 @@ fn show(arguments: Show) -> Result<(), Failure> {
     for record in past.store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)? {
         let record = record.map_err(Failure::failed)?;
         let lines = match arguments.json {
-            true => vec![show::json(&record)],
+            true => vec![show::json(&record).to_string()],
             false => show::readable(&record),
         };
         for line in lines {

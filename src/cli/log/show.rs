@@ -1,4 +1,4 @@
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::events::{Ending, Event, Record};
 use crate::ids::Timestamp;
@@ -7,10 +7,9 @@ use crate::replay;
 
 /// One record as a JSON object: its number, its kind and its whole body. No times, so that equal
 /// histories print equal bytes.
-pub fn json(record: &Record) -> String {
+pub fn json(record: &Record) -> Value {
     let kind = format!("{:?}", record.event.kind());
     json!({ "seq": record.seq.get(), "kind": kind, "event": replay::body(&record.event) })
-        .to_string()
 }
 
 /// One record for a person: number, time (UTC), kind, and what it says.

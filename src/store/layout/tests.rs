@@ -79,8 +79,9 @@ fn a_crash_between_copy_and_flip_leaves_the_old_layout_and_after_it_the_new() {
             let lock = Arc::new(fs::File::open(dir.path().join("LOCK")).unwrap());
             let keys = Keys::open(&dir.path().join("keys"), Arc::new(OsEntropy)).unwrap();
             let keys = Arc::new(keys);
-            let log = super::super::open::open_log(dir.path(), keys.clone(), false, lock.clone())
-                .unwrap();
+            let log =
+                super::super::open::open_log(dir.path(), keys.clone(), false, lock.clone(), false)
+                    .unwrap();
             let cache = SledCache::open(&dir.path().join("cache"), lock).unwrap();
             let former = Former { dir: dir.path(), log: &log, keys: &keys, cache: &cache };
             let crashed = bring_up(&former, 1, |reached| match reached == point {

@@ -3,6 +3,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::cache::{Cache, Cached};
+use super::super::closed::{ClosedMark, Part};
 use super::super::quiet::guarded;
 use super::open_database;
 
@@ -13,6 +14,8 @@ const CACHE_BYTES: u64 = 16 * 1024 * 1024;
 /// the log's database holds nothing but the log. Never synced by us.
 pub(in super::super) struct SledCache {
     db: ::sled::Db,
+    /// Left when the database is closed: fields are dropped in this order.
+    _mark: ClosedMark,
     /// Held until the database is closed.
     _lock: Arc<File>,
 }
@@ -27,7 +30,8 @@ impl SledCache {
             }
             open_database(dir, CACHE_BYTES)
         })?;
-        Ok(SledCache { db, _lock: lock })
+        let home = dir.parent().expect("the cache stands in a data directory");
+        Ok(SledCache { db, _mark: ClosedMark::new(home, Part::Cache), _lock: lock })
     }
 }
 

@@ -1,14 +1,15 @@
 use super::super::log::ReadError;
 use super::super::quiet::guarded;
 use super::super::{DataKey, Walk};
+use super::sentence;
 use crate::events::{Head, Record};
 use crate::ids::{Digest, Seq, StreamKey};
 use crate::limits::STORE_VALUE_BYTES_MAX;
 
 /// stream key (16) ‖ sequence number (8) ‖ chunk (2), big-endian.
-pub(super) const KEY_BYTES: usize = 16 + 8 + 2;
+pub(in super::super) const KEY_BYTES: usize = 16 + 8 + 2;
 
-pub(super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
+pub(in super::super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
     let mut key = [0; KEY_BYTES];
     key[..16].copy_from_slice(&stream.0);
     key[16..24].copy_from_slice(&seq.to_be_bytes());
@@ -74,7 +75,7 @@ pub(super) fn last_seqs(tree: &::sled::Tree) -> Result<Vec<(StreamKey, u64)>, St
     let mut found = Vec::new();
     let mut from = vec![0; KEY_BYTES];
     while let Some(entry) = tree.range(from.clone()..).next() {
-        let (key, _) = entry.map_err(|error| error.to_string())?;
+        let (key, _) = entry.map_err(|error| sentence(&error))?;
         let (stream, _, _) = parse_key(&key).ok_or_else(|| foreign_key(&key).to_string())?;
         let end = chunk_key(stream, u64::MAX, u16::MAX);
         let last = tree.get_lt(end).map_err(|error| error.to_string())?;
@@ -200,7 +201,7 @@ fn next(values: &mut ::sled::Iter) -> Result<Option<Entry>, ReadError> {
     let entry = guarded(|| values.next().transpose());
     match entry {
         Ok(Ok(entry)) => Ok(entry),
-        Ok(Err(error)) => Err(ReadError::Store { reason: error.to_string() }),
+        Ok(Err(error)) => Err(ReadError::Store { reason: sentence(&error) }),
         Err(reason) => Err(ReadError::Store { reason }),
     }
 }

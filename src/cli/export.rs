@@ -1,0 +1,107 @@
+use std::fs::{self, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+
+use super::failure::Failure;
+use super::{data_dir, log};
+use crate::ids::{Seq, TenantId};
+use crate::store;
+
+/// Write one tenant to a file, to be imported elsewhere or analysed.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice export --data lab --out lab.apx
+  apprentice export --data lab --out lab.ndjson --ndjson
+
+Two files are made. FILE holds everything sealed: without the other it shows how many people there are,
+how much they said and when, and no word. FILE.key is the tenant's secret, which opens all of it: move
+it by another way, and keep it as you keep passwords. With --ndjson there is one file, and everything
+that people said stands in it in the clear. All are readable by their owner only.
+
+Exit codes: 1 a record cannot be read, 2 the directory or the file cannot be used.")]
+pub struct Arguments {
+    /// The data directory; it is read and not changed
+    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The lab whose people are exported.
+    #[arg(long, value_name = "NAME", default_value = "local")]
+    tenant: String,
+    /// The file to make; it must not exist.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Write every record opened, one JSON object per line, instead.
+    #[arg(long)]
+    ndjson: bool,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
+    let directory = data_dir::choose(arguments.data)?;
+    if arguments.ndjson {
+        return ndjson(&directory, &tenant, &arguments.out);
+    }
+    let exported =
+        store::export(&directory, &tenant, &arguments.out).map_err(|error| match error {
+            store::ExportError::Damaged { .. } | store::ExportError::Heads { .. } => {
+                Failure::failed(error)
+            }
+            other => Failure::bad_input(other),
+        })?;
+    println!("exported {} records of {} people", exported.records, exported.people);
+    let key = store::key_file_of(&arguments.out);
+    eprintln!("apprentice: {} opens all of it: keep it apart and secret", key.display());
+    Ok(())
+}
+
+fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure> {
+    let copy = store::copy_private(directory).map_err(Failure::bad_input)?;
+    let store = copy.open().map_err(Failure::bad_input)?;
+    let streams = store.log.streams(tenant).map_err(Failure::failed)?;
+    if streams.is_empty() {
+        return Err(Failure::bad_input(format!("there are no records of tenant {tenant}")));
+    }
+    let failed = |error: io::Error| {
+        Failure::bad_input(format!("{} cannot be written: {error}", out.display()))
+    };
+    let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(out);
+    let mut file = BufWriter::new(file.map_err(failed)?);
+    let (mut records, mut erased) = (0_u64, 0_u64);
+    let written = (|| {
+        for stream in &streams {
+            let read = match store.log.read(stream, Seq::FIRST) {
+                Err(store::ReadError::Erased) => {
+                    erased += 1;
+                    continue;
+                }
+                read => read.map_err(Failure::failed)?,
+            };
+            for record in read {
+                let record =
+                    record.map_err(|error| Failure::failed(format!("stream {stream}: {error}")))?;
+                let mut line = log::json(&record);
+                if let Value::Object(fields) = &mut line {
+                    fields.insert("stream".to_owned(), stream.to_string().into());
+                }
+                writeln!(file, "{line}").map_err(failed)?;
+                records += 1;
+            }
+        }
+        file.flush().and_then(|()| file.get_ref().sync_all()).map_err(failed)
+    })();
+    if written.is_err() {
+        // Half of it could be taken for all of it.
+        let _ = fs::remove_file(out);
+    }
+    written?;
+    println!("exported {records} records of {} people", streams.len() as u64 - erased);
+    if erased > 0 {
+        eprintln!("apprentice: {erased} people were erased and are not in it");
+    }
+    Ok(())
+}

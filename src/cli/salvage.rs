@@ -1,0 +1,91 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::data_dir;
+use super::failure::Failure;
+use crate::store::{self, Salvaged};
+
+/// Rescue what can be read of a damaged data directory into a new one.
+///
+/// Every person's records are copied up to the first that is missing or damaged, with all keys. The
+/// directory itself is not changed, and its database need not open.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice salvage --data lab --out lab-rescued
+  apprentice salvage --data lab --out lab-rescued --json | jq .lost
+
+Stopped half-way it leaves DIR2.unfinished, which the next run replaces; DIR2 is whole or not there.
+
+Exit codes: 0 nothing was lost, 1 something was lost (it is listed), 2 nothing could be rescued.")]
+pub struct Arguments {
+    /// The damaged data directory [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The new directory; it must not exist, or be empty.
+    #[arg(long, value_name = "DIR2")]
+    out: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let directory = data_dir::choose(arguments.data)?;
+    let salvaged = store::salvage(&directory, &arguments.out).map_err(Failure::bad_input)?;
+    let lost = losses(&salvaged);
+    let kept: u64 = salvaged.streams.iter().map(|found| found.valid.seq).sum();
+    match arguments.json {
+        true => println!("{}", as_json(&salvaged, kept)),
+        false => {
+            for sentence in &lost {
+                println!("lost: {sentence}");
+            }
+            let people = salvaged.streams.iter().filter(|found| found.valid.seq > 0).count();
+            println!("kept: {kept} records of {people} people");
+        }
+    }
+    match salvaged.is_complete() {
+        true => Ok(()),
+        false => Err(Failure::differences()),
+    }
+}
+
+fn losses(salvaged: &Salvaged) -> Vec<String> {
+    let mut lost = Vec::new();
+    for found in &salvaged.streams {
+        for loss in &found.losses {
+            lost.push(format!("stream {}: {loss}", found.stream));
+        }
+    }
+    if let Some(reason) = &salvaged.heads_damage {
+        lost.push(format!(
+            "the heads file, so that records may be missing at any stream's end: {reason}"
+        ));
+    }
+    if salvaged.unclaimed > 0 {
+        lost.push(format!("{} streams whose tenant is not known any more", salvaged.unclaimed));
+    }
+    lost.extend(salvaged.lost_keys.iter().map(|key| format!("the key file {key}")));
+    lost
+}
+
+fn as_json(salvaged: &Salvaged, kept: u64) -> serde_json::Value {
+    let streams: Vec<_> = salvaged
+        .streams
+        .iter()
+        .map(|found| {
+            let lost: Vec<String> = found.losses.iter().map(ToString::to_string).collect();
+            json!({
+                "stream": found.stream.to_string(),
+                "acknowledged": found.acknowledged,
+                "kept": found.valid.seq,
+                "head": found.valid.digest.to_hex(),
+                "lost": lost,
+            })
+        })
+        .collect();
+    json!({ "kept": kept, "lost": losses(salvaged), "streams": streams })
+}

@@ -1,0 +1,130 @@
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::files::{make_dir, sync_dir};
+use super::rescue::{Rescue, RescueError, StreamFound};
+use super::sled::Adopter;
+use super::{OpenError, open};
+use crate::ids::TenantId;
+
+/// What a salvage copied and what it could not.
+#[derive(Debug)]
+pub struct Salvaged {
+    pub streams: Vec<StreamFound>,
+    /// Streams of which records were found and nothing says whose they were; not copied.
+    pub unclaimed: usize,
+    /// Set when the heads file cannot be trusted: then streams may have been longer.
+    pub heads_damage: Option<String>,
+    /// Key files that could not be copied, each in a sentence.
+    pub lost_keys: Vec<String>,
+}
+
+/// Why nothing was salvaged.
+#[derive(Debug, thiserror::Error)]
+pub enum SalvageError {
+    #[error(transparent)]
+    Source(#[from] RescueError),
+    #[error("{out} is there already and is not empty; name a directory that does not exist")]
+    Occupied { out: String },
+    #[error("{out} cannot be made: {reason}")]
+    Out { out: String, reason: String },
+    #[error("{0}")]
+    Open(#[from] OpenError),
+}
+
+impl Salvaged {
+    pub fn is_complete(&self) -> bool {
+        self.streams.iter().all(|stream| stream.losses.is_empty())
+            && self.unclaimed == 0
+            && self.heads_damage.is_none()
+            && self.lost_keys.is_empty()
+    }
+}
+
+/// Copies each stream's longest valid prefix, and the keys, from `dir` to a new data directory `out`.
+/// Never writes to `dir`, and does not need its database to open.
+///
+/// `out` is made under the name `<out>.unfinished` and gets its own name last: whatever ends this
+/// before leaves no directory that could be taken for a whole one, and a later run starts afresh.
+pub fn salvage(dir: &Path, out: &Path) -> Result<Salvaged, SalvageError> {
+    let failed = |error: &dyn std::fmt::Display| SalvageError::Out {
+        out: out.display().to_string(),
+        reason: error.to_string(),
+    };
+    if fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) || out.is_file() {
+        return Err(SalvageError::Occupied { out: out.display().to_string() });
+    }
+    let rescue = Rescue::open(dir)?;
+    let unfinished = unfinished(out);
+    if unfinished.exists() {
+        fs::remove_dir_all(&unfinished).map_err(|error| failed(&error))?;
+    }
+    // An empty directory with all that belongs into one. Its own tenant key is replaced below.
+    drop(open(&unfinished)?);
+    let mut salvaged = Salvaged {
+        streams: Vec::new(),
+        unclaimed: 0,
+        heads_damage: rescue.heads_damage().map(str::to_owned),
+        lost_keys: Vec::new(),
+    };
+    copy_keys(&dir.join("keys"), &unfinished.join("keys"), &mut salvaged.lost_keys)
+        .map_err(|error| failed(&error))?;
+    let mut adopter = Adopter::open(&unfinished).map_err(|error| failed(&error))?;
+    let (streams, unclaimed) = rescue.streams();
+    salvaged.unclaimed = unclaimed;
+    for stream in streams {
+        let found = rescue.walk(&stream, |head, frame| adopter.put(&stream, head, frame));
+        salvaged.streams.push(found.map_err(|error| failed(&error))?);
+    }
+    adopter.finish().map_err(|error| failed(&error))?;
+    let named = || {
+        if out.exists() {
+            fs::remove_dir(out)?;
+        }
+        fs::rename(&unfinished, out)?;
+        sync_dir(out.parent().filter(|up| !up.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+    };
+    named().map_err(|error: io::Error| failed(&error))?;
+    Ok(salvaged)
+}
+
+fn unfinished(out: &Path) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(".unfinished");
+    PathBuf::from(name)
+}
+
+/// Copies key files as they are, marks of erasure included.
+fn copy_keys(from: &Path, to: &Path, lost: &mut Vec<String>) -> io::Result<()> {
+    let local = to.join(format!("{}.key", TenantId::local()));
+    if local.exists() {
+        fs::remove_file(local)?;
+    }
+    let mut waiting = vec![(from.to_owned(), to.to_owned())];
+    while let Some((source, target)) = waiting.pop() {
+        if source.is_dir() {
+            make_dir(&target)?;
+            let entries = match fs::read_dir(&source) {
+                Ok(entries) => entries,
+                Err(error) => {
+                    lost.push(format!("{}: {error}", source.display()));
+                    continue;
+                }
+            };
+            for entry in entries {
+                let entry = entry?;
+                waiting.push((entry.path(), target.join(entry.file_name())));
+            }
+        } else if source.extension().is_some_and(|kind| kind == "key" || kind == "erased") {
+            // Modes go along.
+            let copied = fs::copy(&source, &target)
+                .and_then(|_| fs::File::open(&target)?.sync_all())
+                .and_then(|()| sync_dir(target.parent().unwrap_or(to)));
+            if let Err(error) = copied {
+                lost.push(format!("{}: {error}", source.display()));
+            }
+        }
+    }
+    Ok(())
+}
