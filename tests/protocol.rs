@@ -487,3 +487,12 @@ fn nobody_answering_is_said_within_the_clients_patience() {
     let error = client.with_patience(Duration::from_millis(300)).hello().unwrap_err();
     assert!(matches!(error, ClientError::NoAnswer { .. }), "{error}");
 }
+
+/// Without it the service could never leave loopback; see `deploy/libzmq`.
+#[test]
+fn libzmq_was_built_with_curve() {
+    assert_eq!(zmq::has("curve"), Some(true));
+    let pair = zmq::CurveKeyPair::new().unwrap();
+    assert_ne!(pair.public_key, pair.secret_key);
+    assert_eq!(zmq::version(), (4, 3, 5));
+}
