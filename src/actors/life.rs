@@ -10,7 +10,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::awake::Awake;
 use super::trainer::Trainer;
-use super::{ErrorCode, Failure, Response};
+use super::{ErrorCode, Failure, Registrar, Response};
 use crate::events::Record;
 use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::learning::{self, Lesson, Mind, Recipe};
@@ -57,6 +57,7 @@ pub(super) struct Life<D: Domain> {
     base: Arc<Mind>,
     minds: Arc<Minds>,
     trainer: OnceLock<Addr<Trainer<D>>>,
+    registrar: Registrar,
     places: Arc<Semaphore>,
     failure: Failure,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
@@ -67,6 +68,7 @@ impl<D: Domain> Life<D> {
     /// Must run on the actix system's thread, where `trainer` starts its threads.
     pub fn start(
         seeded: Seeded<D>,
+        registrar: Registrar,
         trainer: impl FnOnce(Arc<Life<D>>) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
@@ -78,6 +80,7 @@ impl<D: Domain> Life<D> {
             base,
             minds,
             trainer: OnceLock::new(),
+            registrar,
             places: Arc::new(Semaphore::new(TRAIN_QUEUE_MAX)),
             failure,
             _open: open,
@@ -95,6 +98,12 @@ impl<D: Domain> Life<D> {
 
     pub fn trainer(&self) -> &Addr<Trainer<D>> {
         self.trainer.get().expect("set before the first actor starts")
+    }
+
+    /// Who writes the tenants' own streams.
+    #[expect(dead_code, reason = "evidence asks for it")]
+    pub fn registrar(&self) -> &Registrar {
+        &self.registrar
     }
 
     pub fn failure(&self) -> &Failure {
