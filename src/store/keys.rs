@@ -15,6 +15,7 @@ use crate::ids::{StreamId, StreamKey, TenantId, UserId};
 const CACHED_KEYS_MAX: usize = 16_384;
 const KEY_FILE_HEAD: &str = "apprentice user key 1\n";
 const WRAPPING: &str = "apprentice 1: wrapping of user keys";
+const SIGNING: &str = "apprentice 1: signing";
 const STREAM_KEYS: &str = "apprentice 1: stream keys";
 
 /// Why a key cannot be had.
@@ -219,6 +220,12 @@ impl Keys {
         let hash = blake3::keyed_hash(&key, user.as_str().as_bytes());
         let (key, _) = hash.as_bytes().split_first_chunk().expect("a hash has 32 bytes");
         Ok(StreamId { tenant: tenant.clone(), key: StreamKey(*key) })
+    }
+
+    /// The secret Ed25519 key that signs for a tenant.
+    pub fn signing_secret(&self, tenant: &TenantId) -> Result<Zeroizing<[u8; 32]>, KeyError> {
+        let secret = self.tenant_key(&mut self.held(), tenant)?;
+        Ok(Zeroizing::new(blake3::derive_key(SIGNING, secret.expose())))
     }
 
     /// - errors: [`KeyError::Erased`], [`KeyError::Missing`] when there never was one, or why the

@@ -35,7 +35,7 @@ pub use self::faulty::{Fault, FaultPlan, FaultyLog};
 pub use self::import::{ImportError, Imported, import};
 pub use self::keys::{KeyError, Keys};
 pub use self::layout::LAYOUT;
-pub use self::log::{AppendError, EventLog, Pending, ReadError};
+pub use self::log::{AppendError, EventLog, Pending, ReadError, SealedRecord, SealedRecords};
 pub use self::memory::MemoryLog;
 pub use self::models::ModelStore;
 pub use self::open::{OpenError, Store, open, open_memory};
