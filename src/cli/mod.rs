@@ -22,6 +22,7 @@ mod serve;
 mod talk;
 mod terminal;
 mod transcript;
+mod verify;
 
 pub use args::main;
 pub use failure::Failure;
