@@ -1,4 +1,6 @@
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use actix::{Actor, Addr, Handler, Message, SyncArbiter, SyncContext};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -6,8 +8,9 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use super::awake::Awake;
 use super::{Book, Failure, OrderError};
 use crate::events::Event;
-use crate::ids::TenantId;
+use crate::ids::{StreamId, TenantId};
 use crate::limits::REGISTRAR_QUEUE_MAX;
+use crate::replay::Through;
 use crate::store::AppendError;
 use crate::tenancy::{Admissions, Order};
 
@@ -23,6 +26,12 @@ pub struct Registrar {
 /// What came of an order.
 pub type Obeyed = Result<Vec<Event>, OrderError>;
 
+/// A signed checkpoint.
+pub type Signed = Result<String, OrderError>;
+
+/// Seconds between two checkpoints of one tenant that nobody asked for.
+const CHECKPOINT_EVERY_S: u64 = 60;
+
 struct Clerk {
     desk: Arc<Mutex<Desk>>,
     failure: Failure,
@@ -30,8 +39,27 @@ struct Clerk {
 
 struct Desk {
     book: Book,
+    /// When each tenant's tree was signed last, and whether it has grown since.
+    signed: BTreeMap<TenantId, (Instant, bool)>,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
     _open: Awake,
+}
+
+/// A person's episode ended, or they woke: segments may be due.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Close {
+    stream: StreamId,
+    _place: OwnedSemaphorePermit,
+}
+
+#[derive(Message)]
+#[rtype(result = "()")]
+struct SignTree {
+    tenant: TenantId,
+    through: Through,
+    answer: Box<dyn FnOnce(Signed) + Send>,
+    _place: OwnedSemaphorePermit,
 }
 
 #[derive(Message)]
@@ -48,7 +76,7 @@ impl Registrar {
     /// Must run on the actix system's thread.
     pub(super) fn start(book: Book, open: Awake, failure: Failure) -> Registrar {
         let admissions = book.admissions().clone();
-        let desk = Arc::new(Mutex::new(Desk { book, _open: open }));
+        let desk = Arc::new(Mutex::new(Desk { book, signed: BTreeMap::new(), _open: open }));
         let address =
             SyncArbiter::start(1, move || Clerk { desk: desk.clone(), failure: failure.clone() });
         Registrar { address, places: Arc::new(Semaphore::new(REGISTRAR_QUEUE_MAX)), admissions }
@@ -70,23 +98,47 @@ impl Registrar {
         self.address.do_send(Obey { tenant, order, answer, _place: place });
     }
 
+    /// Closes what is due of a person's stream, some time soon. What is forgotten, because the queue
+    /// is full or the service ends, is closed when they wake again.
+    pub fn close(&self, stream: &StreamId) {
+        if let Ok(place) = self.places.clone().try_acquire_owned() {
+            self.address.do_send(Close { stream: stream.clone(), _place: place });
+        }
+    }
+
+    /// Signs a tenant's tree, after closing what is due of each of its people's streams; `answer` is
+    /// called once, from another thread, when the checkpoint is kept.
+    pub fn checkpoint(
+        &self,
+        tenant: TenantId,
+        through: Through,
+        answer: impl FnOnce(Signed) + Send + 'static,
+    ) {
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer(Err(OrderError::Busy));
+        };
+        let answer = Answer(Some(Box::new(answer)));
+        let answer = Box::new(move |signed| answer.send(signed));
+        self.address.do_send(SignTree { tenant, through, answer, _place: place });
+    }
+
     pub fn admissions(&self) -> &Admissions {
         &self.admissions
     }
 }
 
 /// An answer that is never forgotten: dropped unused, it says that nobody carries orders out.
-struct Answer(Option<Box<dyn FnOnce(Obeyed) + Send>>);
+struct Answer<T>(Option<Box<dyn FnOnce(Result<T, OrderError>) + Send>>);
 
-impl Answer {
-    fn send(mut self, obeyed: Obeyed) {
+impl<T> Answer<T> {
+    fn send(mut self, obeyed: Result<T, OrderError>) {
         if let Some(answer) = self.0.take() {
             answer(obeyed);
         }
     }
 }
 
-impl Drop for Answer {
+impl<T> Drop for Answer<T> {
     fn drop(&mut self) {
         if let Some(answer) = self.0.take() {
             answer(Err(OrderError::Gone));
@@ -98,18 +150,88 @@ impl Actor for Clerk {
     type Context = SyncContext<Self>;
 }
 
+impl Desk {
+    /// Closes, and signs now and then, so that a feed of checkpoints goes on by itself.
+    fn close(&mut self, stream: &StreamId) -> Result<(), OrderError> {
+        if self.book.close(stream, Through::Episodes)? == 0 {
+            return Ok(());
+        }
+        let tenant = &stream.tenant;
+        let last = self.signed.get(tenant).map(|(at, _)| *at);
+        if last.is_none_or(|at| at.elapsed().as_secs() >= CHECKPOINT_EVERY_S) {
+            self.book.checkpoint(tenant)?;
+            self.signed.insert(tenant.clone(), (Instant::now(), false));
+        } else if let Some((_, grown)) = self.signed.get_mut(tenant) {
+            *grown = true;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Desk {
+    /// The last checkpoint of a service covers all that it closed.
+    fn drop(&mut self) {
+        for (tenant, _) in self.signed.iter().filter(|(_, (_, grown))| *grown) {
+            if let Err(error) = self.book.checkpoint(tenant) {
+                tracing::warn!(%tenant, %error, "no checkpoint was signed at the end");
+            }
+        }
+    }
+}
+
+impl Clerk {
+    /// Reports what no order can mend.
+    fn look_at(&self, error: &OrderError) {
+        if let OrderError::Append { error, .. } = error
+            && matches!(error, AppendError::Poisoned { .. } | AppendError::Gone)
+        {
+            self.failure.report(error.to_string());
+        }
+    }
+
+    fn desk(&self) -> MutexGuard<'_, Desk> {
+        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Handler<Close> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, close: Close, _: &mut SyncContext<Self>) {
+        let closed = self.desk().close(&close.stream);
+        if let Err(error) = closed {
+            tracing::warn!(stream = %close.stream, %error, "segments are left to be closed later");
+            self.look_at(&error);
+        }
+    }
+}
+
+impl Handler<SignTree> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, sign: SignTree, _: &mut SyncContext<Self>) {
+        let SignTree { tenant, through, answer, _place } = sign;
+        let mut desk = self.desk();
+        let signed = desk.book.sign(&tenant, through);
+        if signed.is_ok() {
+            desk.signed.insert(tenant, (Instant::now(), false));
+        }
+        drop(desk);
+        if let Err(error) = &signed {
+            self.look_at(error);
+        }
+        answer(signed);
+    }
+}
+
 impl Handler<Obey> for Clerk {
     type Result = ();
 
     fn handle(&mut self, obey: Obey, _: &mut SyncContext<Self>) {
         let Obey { tenant, order, answer, _place } = obey;
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let obeyed = desk.book.obey(&tenant, &order);
-        drop(desk);
-        if let Err(OrderError::Append { error, .. }) = &obeyed
-            && matches!(error, AppendError::Poisoned { .. } | AppendError::Gone)
-        {
-            self.failure.report(error.to_string());
+        let obeyed = self.desk().book.obey(&tenant, &order);
+        if let Err(error) = &obeyed {
+            self.look_at(error);
         }
         answer(obeyed);
     }

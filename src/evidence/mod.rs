@@ -21,5 +21,5 @@ pub use checkpoint::{Checkpoint, CheckpointError};
 pub use note::{KeyNameError, NoteError, NoteSigner, VerifierKey};
 pub use proof::{Consistency, Inclusion, Proof, ProofError, Revealed};
 pub use segment::Segment;
-pub use tree::{Frontier, Tree, TreeHash, is_consistent, root_by_path};
+pub use tree::{Tree, TreeHash, is_consistent, root_by_path};
 pub use verify::{Verified, VerifiedRecord, VerifyError, verify};

@@ -2,6 +2,7 @@
 
 mod cache;
 mod check;
+mod checkpoints;
 mod checks;
 mod closed;
 pub mod conformance;
@@ -28,6 +29,7 @@ mod sled;
 mod snapshots;
 
 pub use self::check::{CHECK_COMMAND, check_copy, check_with};
+pub use self::checkpoints::{CheckpointFeed, FeedError};
 pub use self::copy::{PrivateCopy, copy_private};
 pub use self::entropy::{Entropy, OsEntropy, SeededEntropy};
 pub use self::export::{ExportError, Exported, export, key_file_of};

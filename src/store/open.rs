@@ -11,7 +11,8 @@ use super::import;
 use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
 use super::sled::{LogError, SledCache};
 use super::{
-    Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog, SnapshotStore,
+    CheckpointFeed, Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog,
+    SnapshotStore,
 };
 use crate::ids::{StreamId, TenantId};
 
@@ -24,6 +25,7 @@ pub struct Store {
     pub models: Arc<ModelStore>,
     pub snapshots: Arc<SnapshotStore>,
     pub keys: Arc<Keys>,
+    pub checkpoints: Arc<CheckpointFeed>,
 }
 
 /// Why a data directory cannot be opened: a sentence that names it and says what to do.
@@ -142,7 +144,8 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
             layout::bring_up(&former, from, |_| Ok(()))?;
         }
     }
-    Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
+    let checkpoints = Arc::new(CheckpointFeed::of(dir, true));
+    Ok(Store { checkpoints, ..Store::of(Arc::new(log), Arc::new(cache), keys) })
 }
 
 /// A store that ends with the process, for tests and for embedding without a disk.
@@ -156,7 +159,7 @@ impl Store {
     pub(super) fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
         let models = Arc::new(ModelStore::new(cache.clone(), keys.clone()));
         let snapshots = Arc::new(SnapshotStore::new(cache, keys.clone()));
-        Store { log, models, snapshots, keys }
+        Store { log, models, snapshots, keys, checkpoints: Arc::default() }
     }
 
     /// In memory, around another log (a [`super::FaultyLog`], a seeded one).
