@@ -7,6 +7,7 @@ mod check_copy;
 mod converse;
 mod data_dir;
 mod embedded;
+mod erase;
 mod eval;
 mod export;
 mod failure;

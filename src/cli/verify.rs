@@ -77,9 +77,8 @@ pub(super) fn public_key(named: &str) -> Result<VerifierKey, Failure> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| {
-        Failure::bad_input(format!("{} cannot be read: {error}", path.display()))
-    })
+    std::fs::read(path)
+        .map_err(|error| Failure::bad_input(format!("{} cannot be read: {error}", path.display())))
 }
 
 /// The record as it was made, where its body was revealed and this version knows its kind.

@@ -2,11 +2,11 @@
 //! and so does any program that wants the service inside itself (`examples/embed.rs`).
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use crate::actors::{ActorsError, Failure, House, HouseSettings, Wakings};
+use crate::actors::{ActorsError, Erased, Failure, House, HouseSettings, OrderError, Wakings};
 use crate::frontends::{
     Client, ClientError, Context, Counts, Endpoint, EndpointError, Gateway, GatewayError,
 };
@@ -131,6 +131,19 @@ impl Service {
 
     pub fn endpoints(&self) -> &[String] {
         self.gateway.endpoints()
+    }
+
+    /// Erases a person while the service runs: their key is destroyed, their minds and snapshots go,
+    /// and the tenant's stream says so, signed. Blocks.
+    ///
+    /// - errors: nobody of that name, or what stood in the way.
+    pub fn erase(&self, tenant: TenantId, user: UserId) -> Erased {
+        let (sender, receiver) = mpsc::channel();
+        self.house.erase(tenant, user, move |erased| {
+            // Nobody waits any more when the service was dropped meanwhile.
+            let _ = sender.send(erased);
+        });
+        receiver.recv().unwrap_or(Err(OrderError::Gone))
     }
 
     /// What came through the doors.
