@@ -11,6 +11,7 @@ mod eval;
 mod export;
 mod failure;
 mod import;
+mod keys;
 mod log;
 mod logging;
 mod past;
@@ -22,6 +23,7 @@ mod serve;
 mod talk;
 mod terminal;
 mod transcript;
+mod whereto;
 
 pub use args::main;
 pub use failure::Failure;
