@@ -125,3 +125,61 @@ fn now() -> Timestamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     Timestamp(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::events::{Quotas, Role};
+    use crate::ids::PublicKey;
+    use crate::store;
+
+    fn lab() -> TenantId {
+        TenantId::new("lab").unwrap()
+    }
+
+    fn admit(key: PublicKey) -> Order {
+        Order::Admit { key, role: Role::Gateway, label: "door".to_owned() }
+    }
+
+    const KEY: PublicKey = PublicKey([5; 32]);
+
+    #[test]
+    fn what_was_ordered_stands_after_a_restart() {
+        let dir = tempfile::tempdir().unwrap();
+        let quotas = Quotas { awake_users: Some(2), ..Quotas::default() };
+        let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        for order in [Order::Open, admit(KEY), Order::SetQuotas(quotas)] {
+            assert_eq!(book.obey(&lab(), &order).unwrap().len(), 1);
+            assert_eq!(book.obey(&lab(), &order), Ok(vec![]));
+        }
+        let before = book.registry(&lab());
+        drop(book);
+        let book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        assert_eq!(book.registry(&lab()), before);
+        let admitted = book.admissions().admit(&KEY, now()).unwrap();
+        assert_eq!((admitted.tenant, admitted.role), (lab(), Role::Gateway));
+    }
+
+    #[test]
+    fn nothing_is_done_to_a_tenant_that_does_not_exist_and_no_secret_is_made_for_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        let refusal = book.obey(&lab(), &admit(KEY)).unwrap_err().to_string();
+        assert!(refusal.contains("add it first"), "{refusal}");
+        assert!(!dir.path().join("keys/lab.key").exists());
+    }
+
+    #[test]
+    fn one_key_is_one_labs() {
+        let mut book = Book::open(store::open_memory()).unwrap();
+        let other = TenantId::new("other").unwrap();
+        for tenant in [lab(), other.clone()] {
+            book.obey(&tenant, &Order::Open).unwrap();
+        }
+        book.obey(&lab(), &admit(KEY)).unwrap();
+        assert_eq!(book.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
+        // Not even after its first owner is done with it: old messages may still be on their way.
+        book.obey(&lab(), &Order::Retire { key: KEY, overlap_seconds: 0 }).unwrap();
+        assert_eq!(book.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
+    }
+}

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::logging::Logging;
 use super::{
     audit, check_copy, converse, eval, export, import, keys, log, replay, salvage, self_test,
-    serve, talk, transcript,
+    serve, talk, transcript, verify,
 };
 use crate::store;
 
@@ -60,6 +60,7 @@ enum Verb {
     Salvage(salvage::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
+    Verify(verify::Arguments),
     #[command(hide = true)]
     CheckCopy(check_copy::Arguments),
 }
@@ -100,6 +101,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Salvage(arguments)) => salvage::run(arguments),
         Some(Verb::Export(arguments)) => export::run(arguments),
         Some(Verb::Import(arguments)) => import::run(arguments),
+        Some(Verb::Verify(arguments)) => verify::run(arguments),
         Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }
 }

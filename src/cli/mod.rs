@@ -23,6 +23,7 @@ mod serve;
 mod talk;
 mod terminal;
 mod transcript;
+mod verify;
 mod whereto;
 
 pub use args::main;
