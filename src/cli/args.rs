@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::failure::Failure;
 use super::logging::Logging;
 use super::{
-    audit, check_copy, converse, erase, eval, export, import, log, replay, salvage, self_test,
-    serve, talk, transcript, verify,
+    audit, check_copy, converse, erase, eval, export, import, keys, log, replay, salvage,
+    self_test, serve, talk, transcript, verify,
 };
 use crate::store;
 
@@ -50,6 +50,7 @@ struct CommandLine {
 enum Verb {
     Serve(serve::Arguments),
     Talk(talk::Arguments),
+    Keys(keys::Arguments),
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
@@ -91,6 +92,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         None => converse::run(arguments.converse),
         Some(Verb::Serve(arguments)) => serve::run(arguments),
         Some(Verb::Talk(arguments)) => talk::run(arguments),
+        Some(Verb::Keys(arguments)) => keys::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),

@@ -12,6 +12,7 @@ mod eval;
 mod export;
 mod failure;
 mod import;
+mod keys;
 mod log;
 mod logging;
 mod past;
@@ -24,6 +25,7 @@ mod talk;
 mod terminal;
 mod transcript;
 mod verify;
+mod whereto;
 
 pub use args::main;
 pub use failure::Failure;
