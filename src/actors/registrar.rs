@@ -7,7 +7,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::awake::Awake;
 use super::{Book, Failure, OrderError};
-use crate::events::Event;
+use crate::events::{Event, PersonErased};
 use crate::ids::{StreamId, TenantId};
 use crate::limits::REGISTRAR_QUEUE_MAX;
 use crate::replay::Through;
@@ -67,8 +67,19 @@ struct SignTree {
 struct Obey {
     tenant: TenantId,
     order: Order,
-    answer: Box<dyn FnOnce(Obeyed) + Send>,
+    answer: Way<Vec<Event>>,
     /// The queue of a `SyncArbiter` is not bounded by itself.
+    _place: OwnedSemaphorePermit,
+}
+
+/// What came of an erasure.
+pub type Erased = Result<PersonErased, OrderError>;
+
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Erase {
+    stream: StreamId,
+    answer: Way<PersonErased>,
     _place: OwnedSemaphorePermit,
 }
 
@@ -89,10 +100,10 @@ impl Registrar {
         order: Order,
         answer: impl FnOnce(Obeyed) + Send + 'static,
     ) {
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
-            return answer(Err(OrderError::Busy));
-        };
         let answer = Answer(Some(Box::new(answer)));
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer.send(Err(OrderError::Busy));
+        };
         let answer = Box::new(move |obeyed| answer.send(obeyed));
         // A queue that is closed drops the order, and a dropped answer says so.
         self.address.do_send(Obey { tenant, order, answer, _place: place });
@@ -114,12 +125,22 @@ impl Registrar {
         through: Through,
         answer: impl FnOnce(Signed) + Send + 'static,
     ) {
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
-            return answer(Err(OrderError::Busy));
-        };
         let answer = Answer(Some(Box::new(answer)));
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer.send(Err(OrderError::Busy));
+        };
         let answer = Box::new(move |signed| answer.send(signed));
         self.address.do_send(SignTree { tenant, through, answer, _place: place });
+    }
+
+    /// Erases a person for whom nobody speaks any more; `answer` as in [`Registrar::order`].
+    pub(super) fn erase(&self, stream: StreamId, answer: impl FnOnce(Erased) + Send + 'static) {
+        let answer = Answer(Some(Box::new(answer)));
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer.send(Err(OrderError::Busy));
+        };
+        let answer = Box::new(move |erased| answer.send(erased));
+        self.address.do_send(Erase { stream, answer, _place: place });
     }
 
     pub fn admissions(&self) -> &Admissions {
@@ -128,12 +149,14 @@ impl Registrar {
 }
 
 /// An answer that is never forgotten: dropped unused, it says that nobody carries orders out.
-struct Answer<T>(Option<Box<dyn FnOnce(Result<T, OrderError>) + Send>>);
+struct Answer<T>(Option<Way<T>>);
+
+type Way<T> = Box<dyn FnOnce(Result<T, OrderError>) + Send>;
 
 impl<T> Answer<T> {
-    fn send(mut self, obeyed: Result<T, OrderError>) {
+    fn send(mut self, outcome: Result<T, OrderError>) {
         if let Some(answer) = self.0.take() {
-            answer(obeyed);
+            answer(outcome);
         }
     }
 }
@@ -180,9 +203,9 @@ impl Drop for Desk {
 }
 
 impl Clerk {
-    /// Reports what no order can mend.
-    fn look_at(&self, error: &OrderError) {
-        if let OrderError::Append { error, .. } = error
+    /// A log that is poisoned ends the service.
+    fn look_at(&self, error: Option<&OrderError>) {
+        if let Some(OrderError::Append { error, .. }) = error
             && matches!(error, AppendError::Poisoned { .. } | AppendError::Gone)
         {
             self.failure.report(error.to_string());
@@ -201,7 +224,7 @@ impl Handler<Close> for Clerk {
         let closed = self.desk().close(&close.stream);
         if let Err(error) = closed {
             tracing::warn!(stream = %close.stream, %error, "segments are left to be closed later");
-            self.look_at(&error);
+            self.look_at(Some(&error));
         }
     }
 }
@@ -217,9 +240,7 @@ impl Handler<SignTree> for Clerk {
             desk.signed.insert(tenant, (Instant::now(), false));
         }
         drop(desk);
-        if let Err(error) = &signed {
-            self.look_at(error);
-        }
+        self.look_at(signed.as_ref().err());
         answer(signed);
     }
 }
@@ -230,9 +251,18 @@ impl Handler<Obey> for Clerk {
     fn handle(&mut self, obey: Obey, _: &mut SyncContext<Self>) {
         let Obey { tenant, order, answer, _place } = obey;
         let obeyed = self.desk().book.obey(&tenant, &order);
-        if let Err(error) = &obeyed {
-            self.look_at(error);
-        }
+        self.look_at(obeyed.as_ref().err());
         answer(obeyed);
+    }
+}
+
+impl Handler<Erase> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, erase: Erase, _: &mut SyncContext<Self>) {
+        let Erase { stream, answer, _place } = erase;
+        let erased = self.desk().book.erase(&stream);
+        self.look_at(erased.as_ref().err());
+        answer(erased);
     }
 }

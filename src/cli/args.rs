@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::failure::Failure;
 use super::logging::Logging;
 use super::{
-    audit, check_copy, checkpoint, converse, eval, export, import, log, proof, replay, salvage,
-    self_test, serve, talk, transcript, verify,
+    audit, check_copy, checkpoint, converse, erase, eval, export, import, keys, log, proof, replay,
+    salvage, self_test, serve, talk, transcript, verify,
 };
 use crate::store;
 
@@ -53,6 +53,7 @@ struct CommandLine {
 enum Verb {
     Serve(serve::Arguments),
     Talk(talk::Arguments),
+    Keys(keys::Arguments),
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
@@ -62,6 +63,7 @@ enum Verb {
     Salvage(salvage::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
+    Erase(erase::Arguments),
     Checkpoint(checkpoint::Arguments),
     Proof(proof::Arguments),
     Verify(verify::Arguments),
@@ -95,6 +97,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         None => converse::run(arguments.converse),
         Some(Verb::Serve(arguments)) => serve::run(arguments),
         Some(Verb::Talk(arguments)) => talk::run(arguments),
+        Some(Verb::Keys(arguments)) => keys::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
@@ -104,6 +107,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Salvage(arguments)) => salvage::run(arguments),
         Some(Verb::Export(arguments)) => export::run(arguments),
         Some(Verb::Import(arguments)) => import::run(arguments),
+        Some(Verb::Erase(arguments)) => erase::run(arguments),
         Some(Verb::Checkpoint(arguments)) => checkpoint::run(arguments),
         Some(Verb::Proof(arguments)) => proof::run(arguments),
         Some(Verb::Verify(arguments)) => verify::run(arguments),

@@ -5,6 +5,7 @@
 mod audit;
 mod auditor;
 mod difference;
+mod erasures;
 mod evidence;
 mod minds;
 mod origins;

@@ -110,8 +110,9 @@ impl PrivateCopy {
             bring_up(&former, from, |_| Ok(()))?;
         }
         // Read where they are, like the keys.
-        let checkpoints = Arc::new(CheckpointFeed::of(&self.of, false));
-        Ok(Store { checkpoints, ..Store::of(Arc::new(log), Arc::new(cache), keys) })
+        let mut store = Store::of(Arc::new(log), Arc::new(cache), keys);
+        store.checkpoints = Arc::new(CheckpointFeed::of(&self.of, false));
+        Ok(store)
     }
 }
 
