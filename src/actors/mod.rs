@@ -16,6 +16,6 @@ mod user;
 pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
-pub use registrar::{Erased, Obeyed, Registrar};
+pub use registrar::{Erased, Obeyed, Registrar, Signed};
 pub use response::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
 pub use submit::{AnswerTo, Submit};
