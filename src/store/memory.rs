@@ -17,13 +17,15 @@ pub struct MemoryLog {
 
 struct Stream {
     head: Head,
-    frames: Vec<Arc<[u8]>>,
+    frames: Frames,
 }
+
+type Frames = Vec<Arc<[u8]>>;
 
 impl Stream {
     /// The frames from record `from` on as they stand now, and a walk that begins there. They are
     /// shared, so a later append does not show up here.
-    fn from(&self, key: StreamKey, from: Seq) -> Result<(Walk, Vec<Arc<[u8]>>), ReadError> {
+    fn from(&self, key: StreamKey, from: Seq) -> Result<(Walk, Frames), ReadError> {
         let start = usize::try_from(from.get() - 1).unwrap_or(usize::MAX).min(self.frames.len());
         let last = match before(from).and_then(|_| self.frames[..start].last()) {
             None => Head::EMPTY,
