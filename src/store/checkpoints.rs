@@ -3,8 +3,8 @@
 //! rewritten; the service itself compares with the newest here.
 
 use std::collections::BTreeMap;
-use std::fs::{self, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -118,9 +118,18 @@ impl CheckpointFeed {
         notes.into_iter().map(|note| String::from_utf8(note).map_err(|_| damaged())).collect()
     }
 
-    /// The newest checkpoint of a tenant.
+    /// The newest checkpoint of a tenant. Reads the end of the file only: a service that signs every
+    /// minute writes a hundred megabytes a year.
     pub fn newest(&self, tenant: &TenantId) -> Result<Option<String>, FeedError> {
-        Ok(self.all(tenant)?.pop())
+        let Home::Directory { dir, .. } = &self.0 else { return Ok(self.all(tenant)?.pop()) };
+        let path = dir.join(tenant.as_str());
+        let end = match File::open(&path).and_then(|mut file| end_of(&mut file)) {
+            Ok(end) => end,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(cannot(&path, &error)),
+        };
+        let note = end.newest.map(String::from_utf8).transpose();
+        note.map_err(|_| FeedError::Damaged { path: path.display().to_string() })
     }
 
     /// Keeps a checkpoint; durable on return, and only then to be given out.
@@ -141,7 +150,7 @@ impl CheckpointFeed {
             let mut options = OpenOptions::new();
             options.read(true).write(true).create(true).truncate(false).mode(0o600);
             let mut file = options.open(&path)?;
-            let (_, whole) = split(&fs::read(&path)?);
+            let whole = end_of(&mut file)?.whole;
             file.set_len(whole)?;
             file.seek(SeekFrom::Start(whole))?;
             file.write_all(format!("{note}\n").as_bytes())?;
@@ -150,6 +159,36 @@ impl CheckpointFeed {
         })();
         appended.map_err(|error| cannot(&path, &error))
     }
+}
+
+/// Bytes that are read of the end of a file; a note has some hundreds.
+const END_BYTES: u64 = 64 * 1024;
+
+/// The end of a file of checkpoints.
+struct End {
+    /// The last whole note.
+    newest: Option<Vec<u8>>,
+    /// Bytes of the file up to its end.
+    whole: u64,
+}
+
+fn end_of(file: &mut File) -> io::Result<End> {
+    let length = file.metadata()?.len();
+    let from = length.saturating_sub(END_BYTES);
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(from))?;
+    file.read_to_end(&mut bytes)?;
+    let (mut notes, mut whole) = split(&bytes);
+    let mut start = from;
+    // The first of them may have begun before; one alone is no good then.
+    if from > 0 && notes.len() < 2 {
+        bytes.clear();
+        file.seek(SeekFrom::Start(0))?;
+        file.read_to_end(&mut bytes)?;
+        (notes, whole) = split(&bytes);
+        start = 0;
+    }
+    Ok(End { newest: notes.pop(), whole: start + whole })
 }
 
 /// The whole notes of a file, and how many of its bytes they take.
@@ -199,6 +238,28 @@ mod tests {
             assert_eq!(feed().all(&local), Ok(vec![note(1), note(2), note(4)]), "{length} bytes");
         }
         assert_eq!(feed().newest(&TenantId::new("other").unwrap()), Ok(None));
+    }
+
+    #[test]
+    fn the_newest_of_a_long_file_is_found_at_its_end() {
+        let data = tempfile::tempdir().unwrap();
+        let feed = CheckpointFeed::of(data.path(), true);
+        let local = TenantId::local();
+        feed.append(&local, &note(0)).unwrap();
+        let path = data.path().join("checkpoints/local");
+        let many: String = (1..3_000).map(|size| note(size) + "\n").collect();
+        assert!(many.len() as u64 > 2 * END_BYTES);
+        // Wherever the part that is read begins, inside of a note or between two.
+        for cut in (0..200).step_by(7) {
+            let last = &many[..many.len() - cut];
+            fs::write(&path, last).unwrap();
+            let newest = feed.newest(&local).unwrap();
+            assert_eq!(newest.as_ref(), feed.all(&local).unwrap().last(), "{cut} bytes cut");
+            feed.append(&local, &note(9_999)).unwrap();
+            let all = feed.all(&local).unwrap();
+            assert_eq!(all.last(), Some(&note(9_999)));
+            assert_eq!(all.get(all.len() - 2), newest.as_ref(), "{cut} bytes cut");
+        }
     }
 
     #[test]
