@@ -80,7 +80,7 @@ pub const WAIT_S_MAX: u32 = 30;
 pub const AWAKE_USERS_MAX: usize = 10_000;
 /// Minds kept in memory, over all tenants; a mind has some hundred kilobytes.
 pub const MINDS_IN_MEMORY_MAX: usize = 512;
-/// Trainings waiting for a trainer.
+/// Trainings of one tenant that wait for a trainer, at most one for each person.
 pub const TRAIN_QUEUE_MAX: usize = 1_024;
 /// Bytes of one wire frame.
 pub const FRAME_BYTES_MAX: usize = 512 * 1024;

@@ -112,6 +112,7 @@ impl House {
             store,
             recipe,
             recipe_text,
+            trainers,
             minds: minds.clone(),
             failure: failure.clone(),
             open: lives.enter(),
@@ -126,8 +127,8 @@ impl House {
                 let _alarm = alarm;
                 let system = System::new();
                 let directory = system.block_on(async move {
-                    let life = Life::start(parts, |life| {
-                        SyncArbiter::start(trainers.max(1), move || Trainer { life: life.clone() })
+                    let life = Life::start(parts, |life, trainers| {
+                        SyncArbiter::start(trainers, move || Trainer { life: life.clone() })
                     });
                     let arbiters: Vec<Arbiter> =
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
