@@ -234,9 +234,36 @@ byte_id!(
     RequestId, 16, "request id", "32 hexadecimal digits"
 );
 byte_id!(
+    /// The public half of a CURVE key (RFC 26): who a connection is. 32 bytes. Reads and prints as
+    /// 64 hexadecimal digits; ZeroMQ's own form of 40 characters (Z85) is known to `frontends`.
+    PublicKey, 32, "public key", "64 hexadecimal digits"
+);
+byte_id!(
+    /// An Ed25519 signature (RFC 8032). 64 bytes.
+    Signature, 64, "signature", "128 hexadecimal digits"
+);
+byte_id!(
     /// BLAKE3, 256 bits.
     Digest, 32, "digest", "64 hexadecimal digits"
 );
+
+impl StreamKey {
+    /// The tenant's own stream, of what operators did. No name hashes to it but by a chance of one
+    /// in 2^128.
+    pub const TENANT: StreamKey = StreamKey([0; 16]);
+}
+
+impl StreamId {
+    /// The tenant's own stream.
+    pub fn of_tenant(tenant: &TenantId) -> StreamId {
+        StreamId { tenant: tenant.clone(), key: StreamKey::TENANT }
+    }
+
+    /// Whether this is a tenant's own stream, and nobody's life.
+    pub fn is_tenants(&self) -> bool {
+        self.key == StreamKey::TENANT
+    }
+}
 
 impl Digest {
     /// What the first record of a stream names as its predecessor.

@@ -19,6 +19,7 @@ pub mod grounding;
 pub mod learning;
 pub mod parser;
 pub mod session;
+pub mod tenancy;
 pub mod world;
 
 pub mod replay;

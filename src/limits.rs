@@ -70,6 +70,13 @@ pub const COMMIT_GROUP_BYTES_MAX: usize = 8 * 1024 * 1024;
 /// time for its clients to find the next process.
 pub const COMMIT_S_MAX: u64 = 15;
 
+/// Keys that one tenant ever admitted; retired ones are remembered.
+pub const TENANT_KEYS_MAX: usize = 1_024;
+/// Bytes of what an operator writes beside an order: a key's label, a reason.
+pub const LABEL_BYTES_MAX: usize = 200;
+/// Orders waiting for the registrar; then an honest `Busy`.
+pub const REGISTRAR_QUEUE_MAX: usize = 4_096;
+
 /// Messages waiting in one user's mailbox; then an honest `Busy`.
 pub const MAILBOX_MAX: usize = 32;
 /// Requests waiting for one training to end; then an honest `Busy`.

@@ -10,7 +10,7 @@ use super::directory::{Address, Directory, People, SleepAll, Waking};
 use super::life::{Life, Parts};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{Failure, Hello, Submit};
+use super::{Book, Failure, Hello, OrderError, Registrar, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
@@ -20,6 +20,7 @@ use crate::world::Domain;
 /// Everybody who is awake, on an actix system with a thread of its own.
 pub struct House {
     directory: Addr<Directory>,
+    registrar: Registrar,
     system: System,
     thread: Option<JoinHandle<()>>,
     failure: Failure,
@@ -54,12 +55,14 @@ pub struct HouseSettings<D: Domain> {
 }
 
 /// Why the actors did not start.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ActorsError {
     #[error("the recipe for new people cannot be read: {reason}")]
     Recipe { reason: String },
     #[error("the base mind cannot be trained: {reason}")]
     BaseMind { reason: String },
+    #[error("the tenants' own records cannot be read: {0}")]
+    Tenants(#[from] OrderError),
     #[error("the actors did not start: {reason}")]
     System { reason: String },
 }
@@ -107,6 +110,7 @@ impl House {
         let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
         let minds = Arc::<Minds>::default();
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
+        let book = Book::open(store.clone())?;
         let parts = Parts {
             domain,
             store,
@@ -121,36 +125,54 @@ impl House {
 
         let (started, ready) = mpsc::channel();
         let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
+        let (failed, book_open) = (failure.clone(), lives.enter());
         let thread = thread::Builder::new()
             .name("actors".to_owned())
             .spawn(move || {
                 let _alarm = alarm;
                 let system = System::new();
-                let directory = system.block_on(async move {
-                    let life = Life::start(parts, |life, trainers| {
+                let (directory, registrar) = system.block_on(async move {
+                    let registrar = Registrar::start(book, book_open, failed);
+                    let life = Life::start(parts, registrar.clone(), |life, trainers| {
                         SyncArbiter::start(trainers, move || Trainer { life: life.clone() })
                     });
                     let arbiters: Vec<Arbiter> =
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
                     let homes = arbiters.iter().map(Arbiter::handle).collect();
                     let people = Box::new(Homes { life, homes });
-                    Directory::new(people, awake_max, hello, count).start()
+                    (Directory::new(people, awake_max, hello, count).start(), registrar)
                 });
-                let _ = started.send((directory, System::current()));
+                let _ = started.send((directory, registrar, System::current()));
                 if let Err(error) = system.run() {
                     tracing::error!(%error, "the actors' system ended with an error");
                 }
             })
             .map_err(|error| ActorsError::System { reason: error.to_string() })?;
-        let (directory, system) = ready
+        let (directory, registrar, system) = ready
             .recv()
             .map_err(|_| ActorsError::System { reason: "their thread ended at once".to_owned() })?;
         let thread = Some(thread);
-        Ok(House { directory, system, thread, failure, awake, lives, minds, kept_minds, snapshots })
+        Ok(House {
+            directory,
+            registrar,
+            system,
+            thread,
+            failure,
+            awake,
+            lives,
+            minds,
+            kept_minds,
+            snapshots,
+        })
     }
 
     pub fn front(&self) -> Front {
         Front(self.directory.clone().recipient())
+    }
+
+    /// Where orders about tenants are handed in.
+    pub fn registrar(&self) -> &Registrar {
+        &self.registrar
     }
 
     /// People awake now.

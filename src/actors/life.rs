@@ -9,7 +9,7 @@ use actix::Addr;
 
 use super::awake::Awake;
 use super::trainer::{Run, Seat, Train, Trainer};
-use super::{ErrorCode, Failure, Response};
+use super::{ErrorCode, Failure, Registrar, Response};
 use crate::events::Record;
 use crate::fairness::Trainings;
 use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
@@ -59,6 +59,7 @@ pub(super) struct Life<D: Domain> {
     base: Arc<Mind>,
     minds: Arc<Minds>,
     trainer: OnceLock<Addr<Trainer<D>>>,
+    registrar: Registrar,
     trainings: Mutex<Trainings<Train<D>>>,
     failure: Failure,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
@@ -69,6 +70,7 @@ impl<D: Domain> Life<D> {
     /// Must run on the actix system's thread, where `trainer` starts its threads.
     pub fn start(
         seeded: Seeded<D>,
+        registrar: Registrar,
         trainer: impl FnOnce(Arc<Life<D>>, usize) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
@@ -80,6 +82,7 @@ impl<D: Domain> Life<D> {
             base,
             minds,
             trainer: OnceLock::new(),
+            registrar,
             trainings: Mutex::new(Trainings::new(trainers)),
             failure,
             _open: open,
@@ -93,6 +96,12 @@ impl<D: Domain> Life<D> {
 impl<D: Domain> Life<D> {
     pub fn log(&self) -> &dyn EventLog {
         &*self.store.log
+    }
+
+    /// Who writes the tenants' own streams.
+    #[expect(dead_code, reason = "evidence asks for it")]
+    pub fn registrar(&self) -> &Registrar {
+        &self.registrar
     }
 
     pub fn failure(&self) -> &Failure {

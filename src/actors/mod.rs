@@ -1,16 +1,20 @@
 //! Who is awake: one mailbox for each person, one pool of trainers, one directory for all.
 
 mod awake;
+mod book;
 mod directory;
 mod failure;
 mod house;
 mod life;
+mod registrar;
 mod response;
 mod submit;
 mod trainer;
 mod user;
 
+pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
+pub use registrar::{Obeyed, Registrar};
 pub use response::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
 pub use submit::{AnswerTo, Submit};

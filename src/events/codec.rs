@@ -4,7 +4,10 @@ use rmp_serde::decode::Error;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 
-use super::{Event, EventKind, upcast};
+use super::{
+    Event, EventKind, KeyAdmitted, KeyRetired, PersonErased, QuotasSet, SegmentClosed,
+    TenantDisabled, TenantEnabled, TenantOpened, upcast,
+};
 
 /// Why a record's body is no event this binary can read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -32,6 +35,7 @@ pub fn encode(event: &Event) -> Vec<u8> {
         Event::RetrainCompleted(body) => pack(body),
         Event::RetrainFailed(body) => pack(body),
         Event::SessionClosed(body) => pack(body),
+        Event::Tenant(event) => pack(event),
     }
 }
 
@@ -56,6 +60,14 @@ pub fn decode(kind: u16, version: u16, body: &[u8]) -> Result<Event, DecodeError
         EventKind::RetrainCompleted => Event::RetrainCompleted(unpack(kind, body)?),
         EventKind::RetrainFailed => Event::RetrainFailed(unpack(kind, body)?),
         EventKind::SessionClosed => Event::SessionClosed(unpack(kind, body)?),
+        EventKind::TenantOpened => unpack::<TenantOpened>(kind, body)?.into(),
+        EventKind::KeyAdmitted => unpack::<KeyAdmitted>(kind, body)?.into(),
+        EventKind::KeyRetired => unpack::<KeyRetired>(kind, body)?.into(),
+        EventKind::TenantDisabled => unpack::<TenantDisabled>(kind, body)?.into(),
+        EventKind::TenantEnabled => unpack::<TenantEnabled>(kind, body)?.into(),
+        EventKind::QuotasSet => unpack::<QuotasSet>(kind, body)?.into(),
+        EventKind::PersonErased => unpack::<PersonErased>(kind, body)?.into(),
+        EventKind::SegmentClosed => unpack::<SegmentClosed>(kind, body)?.into(),
     })
 }
 

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::TenantEvent;
 use crate::ids::{Digest, Seq, UserId};
 use crate::language::{Answer, Document, Program, Utterance};
 
@@ -20,6 +21,8 @@ pub enum Event {
     RetrainCompleted(RetrainCompleted),
     RetrainFailed(RetrainFailed),
     SessionClosed(SessionClosed),
+    /// Of the tenant's own stream; nothing that a person lived through.
+    Tenant(TenantEvent),
 }
 
 /// The number of a kind in record headers. Never reused, never renumbered.
@@ -37,6 +40,14 @@ pub enum EventKind {
     RetrainCompleted = 9,
     RetrainFailed = 10,
     SessionClosed = 11,
+    TenantOpened = 12,
+    KeyAdmitted = 13,
+    KeyRetired = 14,
+    TenantDisabled = 15,
+    TenantEnabled = 16,
+    QuotasSet = 17,
+    PersonErased = 18,
+    SegmentClosed = 19,
 }
 
 /// A stream began: who, in which world, with which recipe.
@@ -177,12 +188,13 @@ impl Event {
             Event::RetrainCompleted(_) => EventKind::RetrainCompleted,
             Event::RetrainFailed(_) => EventKind::RetrainFailed,
             Event::SessionClosed(_) => EventKind::SessionClosed,
+            Event::Tenant(event) => event.kind(),
         }
     }
 }
 
 impl EventKind {
-    pub const ALL: [EventKind; 11] = [
+    pub const ALL: [EventKind; 19] = [
         EventKind::SessionOpened,
         EventKind::EpisodeStarted,
         EventKind::Interpreted,
@@ -194,6 +206,14 @@ impl EventKind {
         EventKind::RetrainCompleted,
         EventKind::RetrainFailed,
         EventKind::SessionClosed,
+        EventKind::TenantOpened,
+        EventKind::KeyAdmitted,
+        EventKind::KeyRetired,
+        EventKind::TenantDisabled,
+        EventKind::TenantEnabled,
+        EventKind::QuotasSet,
+        EventKind::PersonErased,
+        EventKind::SegmentClosed,
     ];
 
     /// The version of the body that this binary writes.

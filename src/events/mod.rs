@@ -4,6 +4,7 @@ mod codec;
 mod event;
 mod receipt;
 mod record;
+mod tenant;
 mod upcast;
 
 pub use codec::{DecodeError, decode, encode};
@@ -14,3 +15,7 @@ pub use event::{
 };
 pub use receipt::Durable;
 pub use record::{Batch, Head, Header, HeaderError, Record, commitment};
+pub use tenant::{
+    KeyAdmitted, KeyRetired, PersonErased, Quotas, QuotasSet, Role, SegmentClosed, TenantDisabled,
+    TenantEnabled, TenantEvent, TenantOpened,
+};

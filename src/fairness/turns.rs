@@ -29,7 +29,7 @@ impl<J> Turns<J> {
     }
 
     /// The first job of the tenant whose turn it is; its next turn comes after everybody else's.
-    pub fn next(&mut self) -> Option<J> {
+    pub fn pop(&mut self) -> Option<J> {
         let tenant = self.order.pop_front()?;
         let lane = self.lanes.get_mut(&tenant).expect("who is in the order has a lane");
         let job = lane.pop_front().expect("a lane without jobs is removed");
@@ -65,7 +65,7 @@ mod tests {
         (0..1_000).for_each(|job| turns.push(&tenant(0), (0, job)));
         turns.push(&tenant(1), (1, 0));
         turns.push(&tenant(2), (2, 0));
-        let first: Vec<_> = (0..4).map_while(|_| turns.next()).collect();
+        let first: Vec<_> = (0..4).map_while(|_| turns.pop()).collect();
         assert_eq!(first, [(0, 0), (1, 0), (2, 0), (0, 1)]);
         assert_eq!(turns.len(), 998);
     }
@@ -85,7 +85,7 @@ mod tests {
                     continue;
                 }
                 let waiting: Vec<usize> = (0..3).filter(|&t| taken[t] < pushed[t]).collect();
-                match turns.next() {
+                match turns.pop() {
                     None => prop_assert!(waiting.is_empty()),
                     Some((who, job)) => {
                         prop_assert_eq!(job, taken[who]);

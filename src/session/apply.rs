@@ -66,6 +66,7 @@ pub fn apply<D: Domain>(
             state.training = None;
             state.phase = Phase::Closed;
         }
+        Event::Tenant(_) => return Err(outside(seq, "a tenant's own stream")),
     }
     state.head = Head { seq: seq.get(), digest: record.digest }.into();
     state.last_at = record.at;

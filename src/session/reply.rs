@@ -74,11 +74,12 @@ pub enum Told {
 pub fn reply_of(records: &[Record]) -> Reply {
     let first = records.first().expect("an accepted command records at least one event").seq;
     let last = records.last().expect("an accepted command records at least one event").seq;
-    Reply { first, last, told: records.iter().map(told).collect() }
+    Reply { first, last, told: records.iter().filter_map(told).collect() }
 }
 
-fn told(record: &Record) -> Told {
-    match record.event.clone() {
+/// - returns: none for what is nobody's, and stands in no person's stream.
+fn told(record: &Record) -> Option<Told> {
+    Some(match record.event.clone() {
         Event::SessionOpened(event) => Told::Opened { recipe: event.recipe, mind: event.mind },
         Event::EpisodeStarted(event) => {
             Told::EpisodeStarted { goal: event.goal, fewest: event.fewest }
@@ -113,7 +114,8 @@ fn told(record: &Record) -> Told {
         Event::RetrainCompleted(event) => Told::Learned { mind: event.mind, report: event.report },
         Event::RetrainFailed(event) => Told::LearningFailed { reason: event.reason },
         Event::SessionClosed(event) => Told::Closed { reason: event.reason },
-    }
+        Event::Tenant(_) => return None,
+    })
 }
 
 /// Where a person is in the round of an episode.

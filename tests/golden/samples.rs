@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use apprentice::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
-    Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed, RetrainScheduled,
-    SessionClosed, SessionOpened,
+    Interpreted, KeyAdmitted, KeyRetired, LessonForgotten, PersonErased, Quotas, QuotasSet, Report,
+    RetrainCompleted, RetrainFailed, RetrainScheduled, Role, SegmentClosed, SessionClosed,
+    SessionOpened, TenantDisabled, TenantEnabled, TenantOpened,
 };
-use apprentice::ids::{Digest, Seq, UserId};
+use apprentice::ids::{Digest, PublicKey, Seq, Signature, StreamKey, Timestamp, UserId};
 use apprentice::language::{
     Answer, Discarded, Document, Evidence, LiftedUtterance, Near, Outcome, Program, Symbol,
     Utterance,
@@ -32,6 +33,14 @@ pub fn samples() -> Vec<(&'static str, Event)> {
         ("retrain_completed", Event::RetrainCompleted(completed())),
         ("retrain_failed", Event::RetrainFailed(failed())),
         ("session_closed", Event::SessionClosed(closed())),
+        ("tenant_opened", TenantOpened {}.into()),
+        ("key_admitted", key_admitted().into()),
+        ("key_retired", key_retired().into()),
+        ("tenant_disabled", TenantDisabled { reason: "the study is over".to_owned() }.into()),
+        ("tenant_enabled", TenantEnabled {}.into()),
+        ("quotas_set", QuotasSet { quotas: quotas() }.into()),
+        ("person_erased", person_erased().into()),
+        ("segment_closed", segment_closed().into()),
     ]
 }
 
@@ -97,6 +106,27 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("retrain_failed.recipe", "digest of the recipe"),
     ("retrain_failed.reason", "why; the previous mind stays"),
     ("session_closed.reason", "why the person withdrew"),
+    ("key_admitted.key", "the public half of a CURVE key"),
+    ("key_admitted.role", "gateway, operator or auditor"),
+    ("key_admitted.label", "for people: whose machine it is on"),
+    ("key_retired.key", "a key that was admitted before"),
+    ("key_retired.valid_until", "from this moment on it is refused; µs since the epoch"),
+    ("tenant_disabled.reason", "why nobody comes in any more"),
+    ("quotas_set.quotas.awake_users", "people awake at once; null: no limit but the machine's"),
+    ("quotas_set.quotas.in_flight", "requests taken and not yet answered"),
+    ("quotas_set.quotas.utterances_per_second", "utterances a second, in the long run"),
+    ("quotas_set.quotas.burst", "utterances at once after a silence"),
+    ("quotas_set.quotas.sealed_bytes", "sealed bytes in the log, all in all"),
+    ("quotas_set.quotas.trainings_waiting", "trainings waiting"),
+    ("person_erased.stream", "the stream of the person whose key was destroyed"),
+    ("person_erased.last", "the last record of that stream"),
+    ("person_erased.head", "its digest"),
+    ("person_erased.signature", "Ed25519 by the tenant's key over the statement of the erasure"),
+    ("segment_closed.stream", "the stream of which a stretch is sealed"),
+    ("segment_closed.first", "its first record"),
+    ("segment_closed.last", "its last record, included"),
+    ("segment_closed.root", "RFC 6962 tree over the digests of these records"),
+    ("segment_closed.head", "the digest of the last of them"),
 ];
 
 fn seq(number: u64) -> Seq {
@@ -220,4 +250,43 @@ fn failed() -> RetrainFailed {
 
 fn closed() -> SessionClosed {
     SessionClosed { reason: "the study is over".to_owned() }
+}
+
+fn key_admitted() -> KeyAdmitted {
+    let label = "the robot lab's web door".to_owned();
+    KeyAdmitted { key: PublicKey([1; 32]), role: Role::Gateway, label }
+}
+
+fn key_retired() -> KeyRetired {
+    KeyRetired { key: PublicKey([1; 32]), valid_until: Timestamp(1_700_000_000_000_000) }
+}
+
+fn quotas() -> Quotas {
+    Quotas {
+        awake_users: Some(200),
+        in_flight: Some(64),
+        utterances_per_second: Some(50),
+        burst: Some(100),
+        sealed_bytes: Some(10_000_000_000),
+        trainings_waiting: None,
+    }
+}
+
+fn person_erased() -> PersonErased {
+    PersonErased {
+        stream: StreamKey([3; 16]),
+        last: seq(40),
+        head: Digest::of(b"record 40"),
+        signature: Signature([9; 64]),
+    }
+}
+
+fn segment_closed() -> SegmentClosed {
+    SegmentClosed {
+        stream: StreamKey([3; 16]),
+        first: seq(1),
+        last: seq(12),
+        root: Digest::of(b"root"),
+        head: Digest::of(b"record 12"),
+    }
 }

@@ -1,6 +1,6 @@
 use serde_json::{Value, json};
 
-use crate::events::{Ending, Event, Record};
+use crate::events::{Ending, Event, Record, TenantEvent};
 use crate::ids::Timestamp;
 use crate::language::Outcome;
 use crate::replay;
@@ -86,6 +86,28 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
         ),
         Event::RetrainFailed(event) => (event.reason.clone(), vec![]),
         Event::SessionClosed(event) => (event.reason.clone(), vec![]),
+        Event::Tenant(event) => (tenants(event), vec![]),
+    }
+}
+
+fn tenants(event: &TenantEvent) -> String {
+    match event {
+        TenantEvent::Opened(_) | TenantEvent::Enabled(_) => String::new(),
+        TenantEvent::KeyAdmitted(event) => {
+            let role = event.role.name();
+            format!("{role} {} {:?}", event.key, event.label)
+        }
+        TenantEvent::KeyRetired(event) => {
+            format!("{}, good until {}", event.key, utc(event.valid_until))
+        }
+        TenantEvent::Disabled(event) => event.reason.clone(),
+        TenantEvent::QuotasSet(event) => event.quotas.to_string(),
+        TenantEvent::PersonErased(event) => {
+            format!("stream {}, records 1 to {}", event.stream, event.last)
+        }
+        TenantEvent::SegmentClosed(event) => {
+            format!("stream {}, records {} to {}", event.stream, event.first, event.last)
+        }
     }
 }
 
