@@ -60,7 +60,9 @@ fn ask_as(front: &Front, who: (TenantId, UserId), request: RequestId, ask: Ask) 
     let submit = Submit { tenant: who.0, user: who.1, request, ask, answer };
     match front.submit(submit) {
         Ok(()) => {}
-        Err(NotTaken::Full(_) | NotTaken::Closed(_)) => panic!("the directory takes it"),
+        Err(NotTaken::Full(_) | NotTaken::Over(..) | NotTaken::Closed(_)) => {
+            panic!("the directory takes it")
+        }
     }
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }

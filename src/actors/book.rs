@@ -48,6 +48,7 @@ impl Book {
         let tenants = tenants.map_err(|error| OrderError::Read { tenant: local, error })?;
         for tenant in tenants {
             let registry = fold(&book.store, &tenant)?;
+            count_bytes(&book.store, &tenant, &registry);
             book.admissions.update(&tenant, registry.standing());
             book.registries.insert(tenant, registry);
         }
@@ -103,8 +104,19 @@ impl Book {
                 .apply(record)
                 .map_err(|error| OrderError::Disagreement { tenant: tenant.clone(), error })?;
         }
+        count_bytes(&self.store, tenant, registry);
         self.admissions.update(tenant, registry.standing());
         Ok(events)
+    }
+}
+
+/// The first count of a tenant's bytes reads all of them: it is made here, before the doors know of
+/// a limit to hold it against, so that no door waits for it.
+fn count_bytes(store: &Store, tenant: &TenantId, registry: &Registry) {
+    if registry.standing().quotas().sealed_bytes.is_some()
+        && let Err(error) = store.log.sealed_bytes(tenant)
+    {
+        tracing::error!(%tenant, %error, "the count of a tenant's bytes failed");
     }
 }
 

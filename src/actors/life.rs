@@ -8,6 +8,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use actix::Addr;
 
 use super::awake::Awake;
+use super::meters::Meters;
 use super::trainer::{Run, Seat, Train, Trainer};
 use super::{ErrorCode, Failure, Registrar, Response};
 use crate::events::Record;
@@ -30,6 +31,7 @@ pub(super) struct Parts<D: Domain> {
     /// Trainings at once.
     pub trainers: usize,
     pub minds: Arc<Minds>,
+    pub meters: Arc<Meters>,
     pub failure: Failure,
     pub open: Awake,
 }
@@ -58,6 +60,7 @@ pub(super) struct Life<D: Domain> {
     recipe_text: String,
     base: Arc<Mind>,
     minds: Arc<Minds>,
+    meters: Arc<Meters>,
     trainer: OnceLock<Addr<Trainer<D>>>,
     registrar: Registrar,
     trainings: Mutex<Trainings<Train<D>>>,
@@ -74,13 +77,15 @@ impl<D: Domain> Life<D> {
         trainer: impl FnOnce(Arc<Life<D>>, usize) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
-        let Parts { domain, store, recipe: _, recipe_text, trainers, minds, failure, open } = parts;
+        let Parts { domain, store, recipe: _, recipe_text, trainers, minds, meters, failure, open } =
+            parts;
         let life = Arc::new(Life {
             domain,
             store,
             recipe_text,
             base,
             minds,
+            meters,
             trainer: OnceLock::new(),
             registrar,
             trainings: Mutex::new(Trainings::new(trainers)),
@@ -123,10 +128,15 @@ impl<D: Domain> Life<D> {
     /// - returns: whether there was a place for it.
     pub fn queue_training(self: &Arc<Self>, train: Train<D>) -> bool {
         let stream = train.stream.clone();
-        let queued = self.trainings().push(&stream, train, TRAIN_QUEUE_MAX);
+        let quota = self.meters.quotas(&stream.tenant).trainings_waiting;
+        let most = quota.map_or(TRAIN_QUEUE_MAX, |quota| TRAIN_QUEUE_MAX.min(quota as usize));
+        let queued = self.trainings().push(&stream, train, most);
         // What it took the place of was asked for by a former actor of the same person, who is
         // gone.
         let taken = queued.is_ok();
+        if !taken {
+            self.meters.note_training_refused(&stream.tenant);
+        }
         self.hand_out_trainings();
         taken
     }

@@ -9,7 +9,7 @@ use super::wire::{self, Refused};
 use super::{Context, Endpoint};
 use crate::actors::{AnswerTo, ErrorCode, Failure, Front, NotTaken, Response, Submit};
 use crate::ids::{RequestId, TenantId};
-use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX, GATEWAY_IN_FLIGHT_MAX};
+use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX};
 use crate::sabotage;
 
 /// The door: one thread that owns the ROUTER and polls it together with the outbox of the actors.
@@ -281,9 +281,6 @@ impl Door {
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
         }
-        if self.in_flight.load(Ordering::SeqCst) >= GATEWAY_IN_FLIGHT_MAX {
-            return self.busy(peer, id, "the service has too many requests in hand");
-        }
         self.in_flight.fetch_add(1, Ordering::SeqCst);
         let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
         let answer = AnswerTo::new(move |response| {
@@ -299,6 +296,14 @@ impl Door {
                 self.counters.busy.fetch_add(1, Ordering::Relaxed);
                 let full = "the service has too many requests in hand";
                 submit.answer.send(Response::busy(full, RETRY_FULL_MS));
+            }
+            Err(NotTaken::Over(submit, response)) => {
+                let counter = match *response {
+                    Response::QuotaExceeded(_) => &self.counters.over_quota,
+                    _ => &self.counters.busy,
+                };
+                counter.fetch_add(1, Ordering::Relaxed);
+                submit.answer.send(*response);
             }
             Err(NotTaken::Closed(submit)) => {
                 self.failure.report("the directory of people is gone");
@@ -339,6 +344,7 @@ pub struct Counters {
     dropped: AtomicU64,
     refused: AtomicU64,
     busy: AtomicU64,
+    over_quota: AtomicU64,
     undelivered: AtomicU64,
 }
 
@@ -353,6 +359,8 @@ pub struct Counts {
     pub refused: u64,
     /// Turned away by the gateway itself because of too much work.
     pub busy: u64,
+    /// Turned away by the gateway because their tenant takes more than it may.
+    pub over_quota: u64,
     /// Answers whose peer was gone or did not read.
     pub undelivered: u64,
 }
@@ -366,6 +374,7 @@ impl Counters {
             dropped: read(&self.dropped),
             refused: read(&self.refused),
             busy: read(&self.busy),
+            over_quota: read(&self.over_quota),
             undelivered: read(&self.undelivered),
         }
     }

@@ -1,12 +1,13 @@
 //! The one place that wires a service together: store → actors → gateway. The binary starts it,
 //! and so does any program that wants the service inside itself (`examples/embed.rs`).
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use crate::actors::{ActorsError, Failure, House, HouseSettings, Wakings};
+use crate::actors::{ActorsError, Failure, House, HouseSettings, Usage, Wakings};
 use crate::frontends::{
     Client, ClientError, Context, Counts, Endpoint, EndpointError, Gateway, GatewayError,
 };
@@ -136,6 +137,11 @@ impl Service {
     /// What came through the doors.
     pub fn counts(&self) -> Counts {
         self.gateway.counters().now()
+    }
+
+    /// What each tenant takes, and how often it was turned away.
+    pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
+        self.house.usage()
     }
 
     /// People awake now.
