@@ -12,14 +12,13 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, Failure, House, HouseSettings, Response};
+use apprentice::actors::{Ask, Response};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, Context, Endpoint, Gateway, fresh_id};
-use apprentice::ids::{TenantId, UserId};
-use apprentice::learning::Recipe;
+use apprentice::frontends::{Client, Context, CurveKey, Identity, fresh_id};
+use apprentice::ids::{PublicKey, TenantId, UserId};
+use apprentice::service::{Config, Data, Service};
 use apprentice::session::Command;
-use apprentice::store;
-use apprentice::tenancy::{Order, Quotas};
+use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
 
@@ -46,40 +45,29 @@ fn saying(index: usize) -> String {
     format!("go to the {}", if index.is_multiple_of(2) { "mug" } else { "fridge" })
 }
 
-struct Labs {
-    house: House,
-    context: Context,
+fn start(directory: &Path) -> Service {
+    let data = Data::Directory(directory.to_owned());
+    let mut config = Config::new(Arc::new(Household::new()), data);
+    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+    Service::start(config).expect("the service starts")
 }
 
-impl Labs {
-    fn open(directory: &Path) -> Labs {
-        let recipe = Recipe::builtin("default").expect("it ships");
-        let cores = thread::available_parallelism().map_or(1, |cores| cores.get());
-        let house = House::start(HouseSettings {
-            domain: Arc::new(Household::new()),
-            store: store::open(directory).expect("the store opens"),
-            recipe_text: recipe.to_owned(),
-            trainers: cores,
-            arbiters: cores,
-            awake_max: 1_000,
-            failure: Failure::default(),
-        });
-        Labs { house: house.expect("the actors start"), context: Context::new() }
-    }
+fn obey(service: &Service, lab: &TenantId, order: Order) {
+    let (sender, receiver) = mpsc::channel();
+    let answer = move |obeyed| sender.send(obeyed).expect("somebody waits");
+    service.registrar().order(lab.clone(), order, answer);
+    receiver.recv().expect("an answer").expect("it is obeyed");
+}
 
-    fn order(&self, lab: &TenantId, order: Order) {
-        let (sender, receiver) = mpsc::channel();
-        let answer = move |obeyed| sender.send(obeyed).expect("somebody waits");
-        self.house.registrar().order(lab.clone(), order, answer);
-        receiver.recv().expect("an answer").expect("it is obeyed");
-    }
+fn admit(service: &Service, lab: &TenantId, key: PublicKey) {
+    let label = "a benchmark".to_owned();
+    obey(service, lab, Order::Admit { key, role: Role::Gateway, label });
+}
 
-    fn door(&self, lab: &TenantId) -> Gateway {
-        let outer = [Endpoint::parse("tcp://127.0.0.1:0").expect("an endpoint")];
-        let (inner, front) = (format!("inproc://{lab}"), self.house.front());
-        let failure = Failure::default();
-        Gateway::open(&self.context, &inner, &outer, lab.clone(), front, failure).expect("a door")
-    }
+fn connect(service: &Service, key: &CurveKey, number: usize) -> Client {
+    let identity = Identity { key: key.clone(), server: *service.server_key().expect("a key") };
+    let endpoint = &service.curve_endpoints()[0];
+    Client::connect_as(endpoint, user(number), identity).expect("it connects")
 }
 
 /// Sends while it is switched on, as fast as it should, whatever comes back.
@@ -92,12 +80,16 @@ struct Flood {
 }
 
 impl Flood {
-    fn run(&self, endpoint: &str) {
+    fn run(&self, service: &Service, pair: &zmq::CurveKeyPair) {
         let context = Context::new();
         let socket = context.socket(zmq::DEALER).expect("a socket");
         socket.set_linger(0).expect("an option");
         socket.set_sndhwm(100_000).expect("an option");
-        socket.connect(endpoint).expect("it connects");
+        socket.set_curve_publickey(&pair.public_key).expect("an option");
+        socket.set_curve_secretkey(&pair.secret_key).expect("an option");
+        let server = service.server_key().expect("a key");
+        socket.set_curve_serverkey(&server.0).expect("an option");
+        socket.connect(&service.curve_endpoints()[0]).expect("it connects");
         let (mut index, mut start, mut due) = (0, Instant::now(), 0);
         while !self.over.load(Ordering::Relaxed) {
             if !self.on.load(Ordering::Relaxed) {
@@ -159,29 +151,32 @@ fn percentile(times: &mut [Duration], percent: usize) -> f64 {
     times[(times.len() - 1) * percent / 100].as_secs_f64() * 1e3
 }
 
-fn measure(labs: &Labs, name: &str, quotas: Quotas) {
+fn measure(service: &Service, name: &str, quotas: Quotas) {
     let (quiet, flood) = (format!("quiet-{name}"), format!("flood-{name}"));
     let [quiet, flood] = [quiet, flood].map(|lab| TenantId::new(&lab).expect("a good name"));
-    labs.order(&quiet, Order::Open);
-    labs.order(&flood, Order::Open);
-    let (quiet_door, flood_door) = (labs.door(&quiet), labs.door(&flood));
+    let [quiet_key, flood_key] = [&quiet, &flood].map(|lab| {
+        let key = CurveKey::new().expect("a key");
+        obey(service, lab, Order::Open);
+        admit(service, lab, *key.public());
+        key
+    });
+    let pair = zmq::CurveKeyPair::new().expect("a key");
+    admit(service, &flood, PublicKey(pair.public_key));
     for number in 0..CROWD {
-        let client =
-            Client::connect(&flood_door.endpoints()[0], user(number)).expect("it connects");
-        client.start(stage()).expect("an episode starts");
+        connect(service, &flood_key, number).start(stage()).expect("an episode starts");
     }
-    labs.order(&flood, Order::SetQuotas(quotas));
+    obey(service, &flood, Order::SetQuotas(quotas));
     let state = Flood {
         on: AtomicBool::new(false),
         over: AtomicBool::new(false),
         sent: AtomicUsize::new(0),
         heard: Default::default(),
     };
-    let client = Client::connect(&quiet_door.endpoints()[0], user(0)).expect("it connects");
+    let client = connect(service, &quiet_key, 0);
     let (mut said, mut alone, mut beside) = (0, Vec::new(), Vec::new());
     talk(&client, &mut said, &mut Vec::new());
     thread::scope(|scope| {
-        scope.spawn(|| state.run(&flood_door.endpoints()[0]));
+        scope.spawn(|| state.run(service, &pair));
         for _ in 0..ROUNDS {
             talk(&client, &mut said, &mut alone);
             state.on.store(true, Ordering::Relaxed);
@@ -214,13 +209,14 @@ fn measure(labs: &Labs, name: &str, quotas: Quotas) {
 fn main() {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("neighbours");
     let _ = std::fs::remove_dir_all(&directory);
-    let labs = Labs::open(&directory);
+    let service = start(&directory);
     let quotas = Quotas {
         utterances_per_second: Some(2 * QUIET as u32),
         burst: Some(2 * QUIET as u32),
         in_flight: Some(64),
         ..Quotas::default()
     };
-    measure(&labs, "with-quotas", quotas);
-    measure(&labs, "without-quotas", Quotas::default());
+    measure(&service, "with-quotas", quotas);
+    measure(&service, "without-quotas", Quotas::default());
+    service.stop().expect("it stops");
 }

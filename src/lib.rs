@@ -15,6 +15,7 @@ pub mod language;
 pub mod numerics;
 
 pub mod events;
+pub mod evidence;
 pub mod grounding;
 pub mod learning;
 pub mod parser;

@@ -5,21 +5,24 @@
 #[allow(dead_code)]
 mod toy;
 
-use std::path::Path;
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use apprentice::actors::{
-    AnswerTo, Ask, Failure, Front, House, HouseSettings, NotTaken, Quota, Response, Submit,
+    AnswerTo, Ask, Failure, Front, House, HouseSettings, NotTaken, Quota, Refusals, Registrar,
+    Response, Submit,
 };
-use apprentice::frontends::{Client, ClientError, Context, Endpoint, Gateway, fresh_id};
+use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
 use apprentice::ids::{RequestId, TenantId, UserId};
 use apprentice::learning::Recipe;
-use apprentice::session::{Command, OnClash, Query};
+use apprentice::service::{Data, Service};
+use apprentice::session::{Command, OnClash, Phase, Query};
 use apprentice::store::{self, Store};
-use apprentice::tenancy::{Order, Quotas};
+use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::Stage;
 use toy::{Bells, Gate};
+
+const LONG: Duration = Duration::from_secs(30);
 
 fn house(store: Store, gate: Option<&Arc<Gate>>) -> House {
     let domain = gate.map_or_else(Bells::new, |gate| Bells::slow(gate.clone()));
@@ -43,30 +46,44 @@ fn user(number: usize) -> UserId {
     UserId::new(&format!("person {number}")).unwrap()
 }
 
-fn order(house: &House, tenant: &TenantId, order: Order) {
+fn obey(registrar: &Registrar, tenant: &TenantId, order: Order) {
     let (sender, receiver) = mpsc::channel();
-    house.registrar().order(tenant.clone(), order, move |obeyed| sender.send(obeyed).unwrap());
+    registrar.order(tenant.clone(), order, move |obeyed| sender.send(obeyed).unwrap());
     receiver.recv_timeout(Duration::from_secs(60)).expect("an answer").expect("it is obeyed");
 }
 
 /// Labs with these quotas.
 fn allow(house: &House, labs: &[(&TenantId, Quotas)]) {
     for (tenant, quotas) in labs {
-        order(house, tenant, Order::Open);
-        order(house, tenant, Order::SetQuotas(*quotas));
+        obey(house.registrar(), tenant, Order::Open);
+        obey(house.registrar(), tenant, Order::SetQuotas(*quotas));
     }
 }
 
-/// A door of a tenant's own.
-fn door(house: &House, context: &Context, tenant: &TenantId) -> Gateway {
-    let inner = format!("inproc://{tenant}");
-    let outer = [Endpoint::parse("tcp://127.0.0.1:0").unwrap()];
-    let failure = Failure::default();
-    Gateway::open(context, &inner, &outer, tenant.clone(), house.front(), failure).unwrap()
+/// A service with a door for keys, and labs with these quotas.
+fn service(data: Data, labs: &[(&TenantId, Quotas)]) -> Service {
+    let mut config = toy::config(data);
+    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+    let service = Service::start(config).unwrap();
+    for (tenant, quotas) in labs {
+        obey(service.registrar(), tenant, Order::Open);
+        obey(service.registrar(), tenant, Order::SetQuotas(*quotas));
+    }
+    service
 }
 
-fn connect(door: &Gateway, number: usize, patience: Duration) -> Client {
-    Client::connect(&door.endpoints()[0], user(number)).unwrap().with_patience(patience)
+/// A key of a lab's gateway.
+fn admit(service: &Service, tenant: &TenantId) -> CurveKey {
+    let (key, label) = (CurveKey::new().unwrap(), "a test".to_owned());
+    let admit = Order::Admit { key: *key.public(), role: Role::Gateway, label };
+    obey(service.registrar(), tenant, admit);
+    key
+}
+
+fn connect(service: &Service, key: &CurveKey, number: usize, patience: Duration) -> Client {
+    let identity = Identity { key: key.clone(), server: *service.server_key().unwrap() };
+    let client = Client::connect_as(&service.curve_endpoints()[0], user(number), identity);
+    client.unwrap().with_patience(patience)
 }
 
 /// Asks once, past every door.
@@ -102,15 +119,14 @@ const STATUS: Ask = Ask::Query(Query::Status);
 
 #[test]
 fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
-    let house = house(store::open_memory(), None);
     let (flood, quiet) = (lab("flood"), lab("quiet"));
     let quotas = Quotas { utterances_per_second: Some(5), burst: Some(10), ..Quotas::default() };
-    allow(&house, &[(&flood, quotas), (&quiet, Quotas::default())]);
-    let context = Context::new();
-    let (loud_door, quiet_door) = (door(&house, &context, &flood), door(&house, &context, &quiet));
-    let once = Duration::from_millis(1);
-    let mallory = connect(&loud_door, 0, once);
-    let ada = connect(&quiet_door, 0, Duration::from_secs(30));
+    let service = service(Data::Memory, &[(&flood, quotas), (&quiet, Quotas::default())]);
+    let [loud_key, quiet_key] = [&flood, &quiet].map(|tenant| admit(&service, tenant));
+    let mallory = connect(&service, &loud_key, 0, Duration::from_millis(1));
+    let ada = connect(&service, &quiet_key, 0, LONG);
+    // Past the handshake.
+    connect(&service, &loud_key, 0, LONG).hello().unwrap();
     ada.start(stage()).unwrap();
     let (start, mut refused, mut heard) = (Instant::now(), 0, 0);
     for round in 0..500 {
@@ -131,13 +147,13 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
         }
     }
     let most = 10 + 5 * (start.elapsed().as_secs() as usize + 1);
-    let taken = 500 - house.usage()[&flood].refused.utterances as usize;
+    let taken = 500 - service.usage()[&flood].refused.utterances as usize;
     assert!((10..=most).contains(&taken), "{taken} of at most {most} went through");
     assert!(refused > 0 && heard > 0, "{refused} refused, {heard} heard");
-    assert!(loud_door.counters().now().over_quota >= refused);
-    assert_eq!(quiet_door.counters().now().over_quota, 0);
+    assert!(service.counts().over_quota >= refused);
+    assert_eq!(service.usage()[&quiet].refused, Refusals::default());
     // Whoever has patience gets through.
-    let patient = connect(&loud_door, 1, Duration::from_secs(30));
+    let patient = connect(&service, &loud_key, 1, LONG);
     patient.start(stage()).unwrap();
 }
 
@@ -258,32 +274,29 @@ fn fill(client: &Client) -> usize {
     unreachable!("the log fills up")
 }
 
-fn opened(dir: &Path) -> (House, Context) {
-    (house(store::open(dir).unwrap(), None), Context::new())
-}
-
 #[test]
 fn bytes_in_the_log_are_counted_over_a_restart_and_can_be_allowed_again() {
     let dir = tempfile::tempdir().unwrap();
+    let data = Data::Directory(dir.path().to_owned());
     let (full, other) = (lab("full"), lab("other"));
     let limited = |bytes| Quotas { sealed_bytes: Some(bytes), ..Quotas::default() };
-    {
-        let (house, context) = opened(dir.path());
-        allow(&house, &[(&full, limited(20_000)), (&other, Quotas::default())]);
-        let door = door(&house, &context, &full);
-        let ada = connect(&door, 0, Duration::from_secs(30));
-        let commands = fill(&ada);
-        assert!(commands > 10, "{commands} commands");
-    }
-    let (house, context) = opened(dir.path());
-    let (door, elsewhere) = (door(&house, &context, &full), door(&house, &context, &other));
-    let ada = connect(&door, 0, Duration::from_secs(30));
+    let first = service(data.clone(), &[(&full, limited(20_000)), (&other, Quotas::default())]);
+    let [full_key, other_key] = [&full, &other].map(|tenant| admit(&first, tenant));
+    let commands = fill(&connect(&first, &full_key, 0, LONG));
+    assert!(commands > 10, "{commands} commands");
+    first.stop().unwrap();
+
+    let second = service(data, &[]);
+    let ada = connect(&second, &full_key, 0, LONG);
     assert!(matches!(ada.start(stage()), Err(ClientError::OverQuota { .. })));
     ada.status().unwrap();
-    connect(&elsewhere, 0, Duration::from_secs(30)).start(stage()).unwrap();
-    assert!(house.usage()[&full].refused.sealed_bytes > 0);
-    order(&house, &full, Order::SetQuotas(limited(1_000_000)));
-    let _ = ada.done();
+    connect(&second, &other_key, 0, LONG).start(stage()).unwrap();
+    assert!(second.usage()[&full].refused.sealed_bytes > 0);
+    obey(second.registrar(), &full, Order::SetQuotas(limited(1_000_000)));
+    if ada.status().unwrap().phase == Phase::Interacting {
+        ada.done().unwrap();
+    }
     ada.start(stage()).unwrap();
     ada.close("the study is over").unwrap();
+    second.stop().unwrap();
 }

@@ -280,6 +280,7 @@ fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
         "language",
         "numerics",
         "events",
+        "evidence",
         "world",
         "parser",
         "grounding",

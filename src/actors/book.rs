@@ -2,7 +2,8 @@ use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::life::fresh_request;
-use crate::events::{Batch, Event};
+use crate::events::{Batch, Event, Head, PersonErased};
+use crate::evidence;
 use crate::ids::{Seq, StreamId, TenantId, Timestamp};
 use crate::store::{AppendError, KeyError, ReadError, Store};
 use crate::tenancy::{self, Admissions, Disagreement, Order, Refusal, Registry};
@@ -31,6 +32,10 @@ pub enum OrderError {
     Read { tenant: TenantId, error: ReadError },
     #[error("tenant {tenant}: {error}; was it recorded by another version of apprentice?")]
     Disagreement { tenant: TenantId, error: Disagreement },
+    #[error("tenant {tenant} has no records of such a person: nothing was erased")]
+    NobodyThere { tenant: TenantId },
+    #[error("they are still busy; nothing was erased; ask again in a moment")]
+    StillBusy,
     /// The service is ending.
     #[error("the registrar is gone; ask again when the service is back")]
     Gone,
@@ -52,6 +57,7 @@ impl Book {
             book.admissions.update(&tenant, registry.standing());
             book.registries.insert(tenant, registry);
         }
+        book.finish_erasures()?;
         Ok(book)
     }
 
@@ -110,6 +116,66 @@ impl Book {
     }
 }
 
+impl Book {
+    /// Erases a person: destroys their key, drops their minds and snapshots, and says so in the
+    /// tenant's stream, signed. Blocks. Repeating it is harmless.
+    ///
+    /// The caller has seen to it that nobody speaks for the person meanwhile.
+    ///
+    /// - errors: the person never was, or what could not be destroyed or recorded; when only the
+    ///   recording is missing, the next start makes up for it.
+    pub fn erase(&mut self, stream: &StreamId) -> Result<PersonErased, OrderError> {
+        let tenant = stream.tenant.clone();
+        let read = |error| OrderError::Read { tenant: tenant.clone(), error };
+        if self.store.log.walk(stream).map_err(read)? == Head::EMPTY {
+            return Err(OrderError::NobodyThere { tenant });
+        }
+        self.store
+            .erase(stream)
+            .map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
+        self.note_erasure(stream)
+    }
+
+    fn note_erasure(&mut self, stream: &StreamId) -> Result<PersonErased, OrderError> {
+        let tenant = &stream.tenant;
+        if let Some(noted) = self.registries.get(tenant).and_then(|it| it.erased().get(&stream.key))
+        {
+            return Ok(noted.clone());
+        }
+        let read = |error| OrderError::Read { tenant: tenant.clone(), error };
+        let Head { seq, digest: head } = self.store.log.walk(stream).map_err(read)?;
+        let Some(last) = Seq::new(seq) else {
+            return Err(OrderError::NobodyThere { tenant: tenant.clone() });
+        };
+        let secret = self.store.keys.signing_secret(tenant);
+        let secret = secret.map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
+        let statement = tenancy::erasure_statement(tenant, stream.key, last, head);
+        let signature = evidence::sign(&secret, &statement);
+        let order = Order::NoteErasure { stream: stream.key, last, head, signature };
+        self.obey(tenant, &order)?;
+        tracing::info!(%stream, records = seq, "a person was erased");
+        Ok(PersonErased { stream: stream.key, last, head, signature })
+    }
+
+    /// Records the erasures that a crash cut short after the key was gone.
+    fn finish_erasures(&mut self) -> Result<(), OrderError> {
+        let tenants: Vec<TenantId> = self.registries.keys().cloned().collect();
+        for tenant in tenants {
+            let erased = self.store.keys.erased(&tenant);
+            let erased =
+                erased.map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
+            for stream in erased {
+                match self.note_erasure(&stream) {
+                    // A key that never sealed anything.
+                    Ok(_) | Err(OrderError::NobodyThere { .. }) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The first count of a tenant's bytes reads all of them: it is made here, before the doors know of
 /// a limit to hold it against, so that no door waits for it.
 fn count_bytes(store: &Store, tenant: &TenantId, registry: &Registry) {
@@ -136,4 +202,62 @@ pub fn fold(store: &Store, tenant: &TenantId) -> Result<Registry, OrderError> {
 fn now() -> Timestamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     Timestamp(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::events::{Quotas, Role};
+    use crate::ids::PublicKey;
+    use crate::store;
+
+    fn lab() -> TenantId {
+        TenantId::new("lab").unwrap()
+    }
+
+    fn admit(key: PublicKey) -> Order {
+        Order::Admit { key, role: Role::Gateway, label: "door".to_owned() }
+    }
+
+    const KEY: PublicKey = PublicKey([5; 32]);
+
+    #[test]
+    fn what_was_ordered_stands_after_a_restart() {
+        let dir = tempfile::tempdir().unwrap();
+        let quotas = Quotas { awake_users: Some(2), ..Quotas::default() };
+        let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        for order in [Order::Open, admit(KEY), Order::SetQuotas(quotas)] {
+            assert_eq!(book.obey(&lab(), &order).unwrap().len(), 1);
+            assert_eq!(book.obey(&lab(), &order), Ok(vec![]));
+        }
+        let before = book.registry(&lab());
+        drop(book);
+        let book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        assert_eq!(book.registry(&lab()), before);
+        let admitted = book.admissions().admit(&KEY, now()).unwrap();
+        assert_eq!((admitted.tenant, admitted.role), (lab(), Role::Gateway));
+    }
+
+    #[test]
+    fn nothing_is_done_to_a_tenant_that_does_not_exist_and_no_secret_is_made_for_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        let refusal = book.obey(&lab(), &admit(KEY)).unwrap_err().to_string();
+        assert!(refusal.contains("add it first"), "{refusal}");
+        assert!(!dir.path().join("keys/lab.key").exists());
+    }
+
+    #[test]
+    fn one_key_is_one_labs() {
+        let mut book = Book::open(store::open_memory()).unwrap();
+        let other = TenantId::new("other").unwrap();
+        for tenant in [lab(), other.clone()] {
+            book.obey(&tenant, &Order::Open).unwrap();
+        }
+        book.obey(&lab(), &admit(KEY)).unwrap();
+        assert_eq!(book.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
+        // Not even after its first owner is done with it: old messages may still be on their way.
+        book.obey(&lab(), &Order::Retire { key: KEY, overlap_seconds: 0 }).unwrap();
+        assert_eq!(book.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
+    }
 }

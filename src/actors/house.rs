@@ -8,15 +8,16 @@ use actix::{Actor, Addr, Arbiter, ArbiterHandle, Recipient, SyncArbiter, System}
 
 use super::awake::AwakeCount;
 use super::directory::{Address, Directory, People, SleepAll, Waking};
+use super::farewell::Farewell;
 use super::life::{Life, Parts};
 use super::meters::{Meters, Usage};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{Book, Failure, Hello, OrderError, Registrar, Response, Submit};
+use super::{Book, Erased, Failure, Hello, OrderError, Registrar, Response, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
-use crate::store::{CacheCounter, CacheCounts, Store};
+use crate::store::{CacheCounter, CacheCounts, KeyError, Store};
 use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
@@ -155,7 +156,11 @@ impl House {
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
                     let homes = arbiters.iter().map(Arbiter::handle).collect();
                     let people = Box::new(Homes { life, homes });
-                    (Directory::new(people, awake_max, hello, count, measured).start(), registrar)
+                    let for_directory = registrar.clone();
+                    let directory =
+                        Directory::new(people, awake_max, hello, count, measured, for_directory)
+                            .start();
+                    (directory, registrar)
                 });
                 let _ = started.send((directory, registrar, System::current()));
                 if let Err(error) = system.run() {
@@ -194,6 +199,19 @@ impl House {
     /// Where orders about tenants are handed in.
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
+    }
+
+    /// Erases a person: destroys their key, so that nothing they said can be read any more, and
+    /// records that it was done. `answer` is called once, from another thread. Nobody is awake in
+    /// their name meanwhile; whoever uses the name afterwards is somebody new.
+    pub fn erase(
+        &self,
+        tenant: TenantId,
+        user: UserId,
+        answer: impl FnOnce(Erased) + Send + 'static,
+    ) {
+        let answer = Box::new(answer);
+        self.directory.do_send(Farewell { tenant, user, answer });
     }
 
     /// People awake now.
@@ -251,7 +269,7 @@ struct Homes<D: Domain> {
 }
 
 impl<D: Domain> People for Homes<D> {
-    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String> {
+    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
         self.life.stream_of(tenant, user)
     }
 

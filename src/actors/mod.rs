@@ -4,6 +4,7 @@ mod awake;
 mod book;
 mod directory;
 mod failure;
+mod farewell;
 mod house;
 mod life;
 mod meters;
@@ -17,7 +18,7 @@ pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
 pub use meters::{Refusals, Usage};
-pub use registrar::{Obeyed, Registrar};
+pub use registrar::{Erased, Obeyed, Registrar};
 pub use response::{
     Ask, Busy, ErrorCode, Failed, Hello, Quota, QuotaExceeded, Rejected, Response, Waited,
 };

@@ -117,6 +117,8 @@ pub enum ErrorCode {
     UnknownVerb,
     /// The command exists, but only inside the service.
     InternalVerb,
+    /// Whoever asks may not ask this.
+    Denied,
     /// This person's stream cannot be read or written now; an operator must look.
     Unavailable,
     /// We are wrong: a defect, with what is known about it.

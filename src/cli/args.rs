@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::failure::Failure;
 use super::logging::Logging;
 use super::{
-    audit, check_copy, converse, eval, export, import, log, replay, salvage, self_test, serve,
-    talk, transcript,
+    audit, check_copy, converse, erase, eval, export, import, keys, log, replay, salvage,
+    self_test, serve, talk, transcript, verify,
 };
 use crate::store;
 
@@ -50,6 +50,7 @@ struct CommandLine {
 enum Verb {
     Serve(serve::Arguments),
     Talk(talk::Arguments),
+    Keys(keys::Arguments),
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
@@ -59,6 +60,8 @@ enum Verb {
     Salvage(salvage::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
+    Erase(erase::Arguments),
+    Verify(verify::Arguments),
     #[command(hide = true)]
     CheckCopy(check_copy::Arguments),
 }
@@ -89,6 +92,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         None => converse::run(arguments.converse),
         Some(Verb::Serve(arguments)) => serve::run(arguments),
         Some(Verb::Talk(arguments)) => talk::run(arguments),
+        Some(Verb::Keys(arguments)) => keys::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
@@ -98,6 +102,8 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Salvage(arguments)) => salvage::run(arguments),
         Some(Verb::Export(arguments)) => export::run(arguments),
         Some(Verb::Import(arguments)) => import::run(arguments),
+        Some(Verb::Erase(arguments)) => erase::run(arguments),
+        Some(Verb::Verify(arguments)) => verify::run(arguments),
         Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }
 }

@@ -1,3 +1,4 @@
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::failure::Failure;
@@ -11,13 +12,22 @@ pub struct Wanted {
     pub data: Data,
     pub recipe_text: String,
     pub listen: Vec<String>,
+    pub listen_curve: Vec<String>,
+    pub server_key: Option<PathBuf>,
     pub faults: Option<FaultPlan>,
 }
 
 impl Wanted {
     /// A service for this process alone.
     pub fn inside(data: Data, recipe_text: String) -> Wanted {
-        Wanted { data, recipe_text, listen: Vec::new(), faults: None }
+        Wanted {
+            data,
+            recipe_text,
+            listen: Vec::new(),
+            listen_curve: Vec::new(),
+            server_key: None,
+            faults: None,
+        }
     }
 }
 
@@ -30,10 +40,13 @@ pub fn start(wanted: Wanted) -> Result<Service, Failure> {
     config.recipe_text = wanted.recipe_text;
     config.faults = wanted.faults;
     config.listen = wanted.listen;
+    config.listen_curve = wanted.listen_curve;
+    config.server_key = wanted.server_key;
     Service::start(config).map_err(|error| match error {
-        StartError::Endpoint(_) | StartError::Store(_) | StartError::Gateway(_) => {
-            Failure::bad_input(error)
-        }
+        StartError::Endpoint(_)
+        | StartError::ServerKey(_)
+        | StartError::Store(_)
+        | StartError::Gateway(_) => Failure::bad_input(error),
         StartError::Actors(_) | StartError::Drill(_) => Failure::failed(error),
     })
 }

@@ -3,8 +3,8 @@ use std::time::Duration;
 use clap::Args;
 
 use super::failure::Failure;
+use super::whereto::Whereto;
 use super::{embedded, terminal};
-use crate::frontends::Client;
 
 /// How long a service may take to say hello before it is taken for absent.
 const HELLO_PATIENCE: Duration = Duration::from_secs(5);
@@ -17,12 +17,12 @@ const PATIENCE: Duration = Duration::from_secs(60);
 Examples:
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada < requests.txt
+  apprentice talk --connect tcp://robot.example:7117 --user ada --key lab.key --server-key server.pub
 
 Exit codes: 0 the conversation ended, 1 no answer or the service failed, 2 bad usage.")]
 pub struct Arguments {
-    /// Where the service listens.
-    #[arg(long, value_name = "ENDPOINT")]
-    connect: String,
+    #[command(flatten)]
+    whereto: Whereto,
     /// Who is talking: each person teaches a robot of their own.
     #[arg(long, value_name = "NAME", default_value = "you")]
     user: String,
@@ -37,8 +37,7 @@ pub struct Arguments {
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let user = embedded::user(&arguments.user)?;
-    let client = Client::connect(&arguments.connect, user).map_err(Failure::bad_input)?;
-    let client = client.with_patience(HELLO_PATIENCE);
+    let client = arguments.whereto.client(user)?.with_patience(HELLO_PATIENCE);
     client.hello().map_err(Failure::failed)?;
     let client = client.with_patience(PATIENCE);
     terminal::talk(&client, arguments.seed, arguments.task, None)

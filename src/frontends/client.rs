@@ -1,9 +1,11 @@
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
+use super::knock::{Knock, knock};
 use super::wire::{self, Request};
-use super::{Context, Endpoint, EndpointError};
+use super::{Context, CurveKey, Endpoint, EndpointError, z85};
 use crate::actors::{Ask, Hello, Quota, QuotaExceeded, Response, Waited};
-use crate::ids::{RequestId, Seq, UserId};
+use crate::ids::{PublicKey, RequestId, Seq, UserId};
 use crate::limits::{CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, WAIT_S_MAX};
 use crate::session::{Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status};
 use crate::world::{Stage, View};
@@ -14,7 +16,28 @@ pub struct Client {
     socket: zmq::Socket,
     user: UserId,
     endpoint: String,
+    identity: Option<Identity>,
     patience: Duration,
+    state: Cell<Line>,
+}
+
+/// Who a client is where keys are asked for, and whom it takes for the service.
+#[derive(Debug, Clone)]
+pub struct Identity {
+    pub key: CurveKey,
+    /// The service's public key; whoever has another one is not talked to.
+    pub server: PublicKey,
+}
+
+/// What is known of a client's connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Line {
+    /// Nothing was heard on it yet.
+    Fresh,
+    /// An answer came through it.
+    Heard,
+    /// It was not let in, after which ZeroMQ does not try again by itself.
+    Closed,
 }
 
 /// Why there is no answer.
@@ -28,6 +51,23 @@ pub enum ClientError {
     /// Whether the request was carried out is not known; asking again with the same id will tell.
     #[error("no answer from {endpoint} within {seconds} s; is the service running?")]
     NoAnswer { endpoint: String, seconds: u64 },
+    #[error(
+        "the service at {endpoint} does not let in your key {key}; ask whoever runs it \
+         (`apprentice tenant admit` lets a key in)"
+    )]
+    NotAdmitted { endpoint: String, key: String },
+    #[error(
+        "whoever listens at {endpoint} is not the service with the key {server}; ask whoever runs \
+         it for the right one (`apprentice keys show` prints it)"
+    )]
+    WrongServer { endpoint: String, server: String },
+    #[error(
+        "the service at {endpoint} lets in only those with a key; name yours with --key FILE and \
+         the service's with --server-key KEY"
+    )]
+    KeyWanted { endpoint: String },
+    #[error("the service at {endpoint} asks for no key; leave --key and --server-key out")]
+    NoKeyWanted { endpoint: String },
     #[error("the service at {endpoint} stayed busy for {seconds} s: {message}")]
     Busy { endpoint: String, seconds: u64, message: String },
     /// The tenant takes more than it may, and waiting did not help or would not.
@@ -47,21 +87,58 @@ pub enum ClientError {
 const ATTEMPT: Duration = Duration::from_secs(2);
 /// The longest that one attempt waits.
 const ATTEMPT_MAX: Duration = Duration::from_secs(10);
+/// How long it is tried to find out why an answer is overdue.
+const KNOCK: Duration = Duration::from_secs(1);
+
+impl Identity {
+    pub(super) fn put_on(&self, socket: &zmq::Socket) -> zmq::Result<()> {
+        socket.set_curve_serverkey(&self.server.0)?;
+        socket.set_curve_publickey(&self.key.public().0)?;
+        socket.set_curve_secretkey(self.key.secret())
+    }
+}
 
 impl Client {
-    /// A client of a service in another process.
+    /// A client of a service in another process of this machine, at a door without keys.
     pub fn connect(endpoint: &str, user: UserId) -> Result<Client, ClientError> {
+        let endpoint = match Endpoint::parse(endpoint)? {
+            Endpoint::Network { .. } => {
+                return Err(EndpointError::KeyWanted { endpoint: endpoint.to_owned() }.into());
+            }
+            endpoint => endpoint.to_string(),
+        };
+        Client::open(&Context::new(), &endpoint, user, None)
+    }
+
+    /// A client of a service at a door with keys, here or elsewhere.
+    pub fn connect_as(
+        endpoint: &str,
+        user: UserId,
+        identity: Identity,
+    ) -> Result<Client, ClientError> {
         let endpoint = Endpoint::parse(endpoint)?.to_string();
-        Client::within(&Context::new(), &endpoint, user)
+        Client::open(&Context::new(), &endpoint, user, Some(identity))
     }
 
     /// A client that shares `context` with the service.
     pub fn within(context: &Context, endpoint: &str, user: UserId) -> Result<Client, ClientError> {
+        Client::open(context, endpoint, user, None)
+    }
+
+    fn open(
+        context: &Context,
+        endpoint: &str,
+        user: UserId,
+        identity: Option<Identity>,
+    ) -> Result<Client, ClientError> {
         let open = || -> zmq::Result<zmq::Socket> {
             let socket = context.socket(zmq::DEALER)?;
             // A client that gives up must not keep its process from ending.
             socket.set_linger(0)?;
             socket.set_ipv6(endpoint.contains('['))?;
+            if let Some(identity) = &identity {
+                identity.put_on(&socket)?;
+            }
             socket.connect(endpoint)?;
             Ok(socket)
         };
@@ -70,7 +147,8 @@ impl Client {
             reason: error.to_string(),
         })?;
         let patience = Duration::from_secs(CLIENT_RETRY_S_MAX);
-        Ok(Client { socket, user, endpoint: endpoint.to_owned(), patience })
+        let (endpoint, state) = (endpoint.to_owned(), Cell::new(Line::Fresh));
+        Ok(Client { socket, user, endpoint, identity, patience, state })
     }
 
     /// How long a request is retried before it is given up; [`CLIENT_RETRY_S_MAX`] at most, since
@@ -202,9 +280,12 @@ impl Client {
         if bytes.len() > FRAME_BYTES_MAX {
             return Err(ClientError::TooLarge { found: bytes.len() });
         }
+        if self.state.get() == Line::Closed {
+            self.reconnect()?;
+        }
         let end = Instant::now() + self.patience + waits;
         let (mut attempt, mut send, mut busy) = (ATTEMPT, true, None);
-        let mut pause = Duration::ZERO;
+        let (mut pause, mut knocked) = (Duration::ZERO, false);
         loop {
             let now = Instant::now();
             if now >= end {
@@ -247,9 +328,50 @@ impl Client {
                 }
                 Some(response) => return Ok(response),
                 None if !pause.is_zero() => (pause, send) = (Duration::ZERO, true),
-                None => attempt = ATTEMPT_MAX.min(attempt * 2),
+                None => {
+                    attempt = ATTEMPT_MAX.min(attempt * 2);
+                    if !std::mem::replace(&mut knocked, true) {
+                        self.find_out()?;
+                    }
+                }
             }
         }
+    }
+
+    /// An answer is overdue: whether that will not change by waiting.
+    fn find_out(&self) -> Result<(), ClientError> {
+        if self.endpoint.starts_with("inproc:") {
+            return Ok(());
+        }
+        let endpoint = self.endpoint.clone();
+        let error = match (knock(&endpoint, self.identity.as_ref(), KNOCK), &self.identity) {
+            (Knock::Silence, _) | (Knock::BrokenOff | Knock::NotAdmitted, None) => return Ok(()),
+            (Knock::LetIn, _) => {
+                // Let in now, and perhaps not when this client came.
+                return match self.state.get() {
+                    Line::Heard => Ok(()),
+                    Line::Fresh | Line::Closed => self.reconnect(),
+                };
+            }
+            (Knock::NotAdmitted, Some(identity)) => {
+                ClientError::NotAdmitted { endpoint, key: z85::show(identity.key.public()) }
+            }
+            (Knock::BrokenOff, Some(identity)) => {
+                ClientError::WrongServer { endpoint, server: z85::show(&identity.server) }
+            }
+            (Knock::OtherDoor, None) => ClientError::KeyWanted { endpoint },
+            (Knock::OtherDoor, Some(_)) => ClientError::NoKeyWanted { endpoint },
+        };
+        self.state.set(Line::Closed);
+        Err(error)
+    }
+
+    fn reconnect(&self) -> Result<(), ClientError> {
+        // Without a connection there is none to give up.
+        let _ = self.socket.disconnect(&self.endpoint);
+        self.socket.connect(&self.endpoint).map_err(|error| self.socket_error(error))?;
+        self.state.set(Line::Fresh);
+        Ok(())
     }
 
     fn send(&self, bytes: &[u8]) -> Result<(), ClientError> {
@@ -273,7 +395,10 @@ impl Client {
                 Err(error) => return Err(self.socket_error(error)),
             }
             let frames = match self.socket.recv_multipart(zmq::DONTWAIT) {
-                Ok(frames) => frames,
+                Ok(frames) => {
+                    self.state.set(Line::Heard);
+                    frames
+                }
                 Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => continue,
                 Err(error) => return Err(self.socket_error(error)),
             };

@@ -1,25 +1,52 @@
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use super::counters::{Counters, count};
+use super::door::{Door, Incoming, Keyed, Sender};
 use super::outbox::{Inbox, Outbox};
+use super::rights::{self, Caller};
 use super::wire::{self, Refused};
-use super::{Context, Endpoint};
-use crate::actors::{AnswerTo, ErrorCode, Failure, Front, NotTaken, Response, Submit};
-use crate::ids::{RequestId, TenantId};
-use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX};
+use super::zap::{Doorkeeper, Seal};
+use super::{Context, CurveKey, Endpoint, lock};
+use crate::actors::{AnswerTo, ErrorCode, Failed, Failure, Front, NotTaken, Response, Submit};
+use crate::ids::RequestId;
 use crate::sabotage;
+use crate::tenancy::Admissions;
 
-/// The door: one thread that owns the ROUTER and polls it together with the outbox of the actors.
+/// The doors: one thread that owns their ROUTERs and polls them together with the outbox of the
+/// actors.
 #[derive(Debug)]
 pub struct Gateway {
-    endpoints: Vec<String>,
+    open: Vec<String>,
+    locked: Vec<String>,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
     outbox: Outbox<Outgoing>,
     thread: Option<JoinHandle<()>>,
+    // After the gateway's thread has closed its sockets: without it handshakes fail open.
+    _doorkeeper: Option<Doorkeeper>,
+}
+
+/// Where a gateway listens.
+#[derive(Debug)]
+pub struct Doors<'a> {
+    /// The name inside the process, in the context it is opened in.
+    pub inner: &'a str,
+    /// Without keys: whoever reaches these is the single user of this machine.
+    pub open: &'a [Endpoint],
+    /// With keys.
+    pub locked: Option<LockedDoor<'a>>,
+}
+
+/// Where only those come in whose key was admitted.
+#[derive(Debug)]
+pub struct LockedDoor<'a> {
+    pub endpoints: &'a [Endpoint],
+    pub key: &'a CurveKey,
+    pub admissions: Admissions,
 }
 
 /// Why the gateway did not open.
@@ -27,6 +54,11 @@ pub struct Gateway {
 pub enum GatewayError {
     #[error("cannot listen on {endpoint}: {reason}")]
     Bind { endpoint: String, reason: String },
+    #[error(
+        "this build of ZeroMQ has no CURVE, so nobody could tell who is knocking; {}",
+        lock::MEND
+    )]
+    NoCurve,
     #[error("the gateway did not start: {reason}")]
     Start { reason: String },
 }
@@ -41,6 +73,8 @@ struct Outgoing {
 /// Whom a message came from. Only a way back: never a proof of who they are.
 #[derive(Debug, Clone)]
 struct Peer {
+    /// The place of its door in [`Hall::doors`].
+    door: usize,
     routing_id: Vec<u8>,
     /// REQ sockets put an empty frame between envelope and message and want it back.
     delimiter: bool,
@@ -52,30 +86,44 @@ const RETRY_FULL_MS: u32 = 200;
 const DRAIN: Duration = Duration::from_secs(10);
 /// Messages read before answers are sent again, so that neither direction starves.
 const BURST: usize = 256;
-/// Milliseconds that answers already sent may take to leave the process at a stop.
-const LINGER_MS: i32 = 1_000;
-
 impl Gateway {
-    /// Listens on `inner` (an inproc name of `context`) and on all of `outer`.
+    /// Opens all of `doors`.
     ///
-    /// - `tenant`: whose door this is; no request can say otherwise.
-    /// - errors: an address that is taken or does not exist.
+    /// - errors: an address that is taken or does not exist; keys wanted where ZeroMQ has none.
     pub fn open(
         context: &Context,
-        inner: &str,
-        outer: &[Endpoint],
-        tenant: TenantId,
+        doors: Doors<'_>,
         front: Front,
         failure: Failure,
     ) -> Result<Gateway, GatewayError> {
         let start = |reason: String| GatewayError::Start { reason };
         let (outbox, inbox) = Outbox::new().map_err(|error| start(error.to_string()))?;
-        let (router, endpoints) = bind(context, inner, outer)?;
         let counters = Arc::new(Counters::default());
+        let door = Door::new(context, None)?;
+        door.bind_inner(doors.inner)?;
+        let open = door.bind(doors.open)?;
+        let mut locked = Vec::new();
+        let mut routers = vec![door];
+        let mut doorkeeper = None;
+        if let Some(LockedDoor { endpoints, key, admissions }) = doors.locked {
+            lock::check(zmq::has("curve"))?;
+            let (seal, wake) = (Seal::fresh(), outbox.clone());
+            let keeper = Doorkeeper::start(
+                context,
+                seal.clone(),
+                admissions.clone(),
+                counters.clone(),
+                failure.clone(),
+                move || wake.wake(),
+            );
+            doorkeeper = Some(keeper.map_err(start)?);
+            let door = Door::new(context, Some(Keyed { key, admissions, seal }))?;
+            locked = door.bind(endpoints)?;
+            routers.push(door);
+        }
         let stopping = Arc::new(AtomicBool::new(false));
-        let door = Door {
-            router,
-            tenant,
+        let hall = Hall {
+            doors: routers,
             front,
             failure: failure.clone(),
             counters: counters.clone(),
@@ -89,17 +137,30 @@ impl Gateway {
             .spawn(move || {
                 let _alarm = failure.alarm("the gateway's thread ended");
                 let _ = ready.send(());
-                door.serve(inbox);
+                hall.serve(inbox);
             })
             .map_err(|error| start(error.to_string()))?;
         started.recv().map_err(|_| start("its thread ended at once".to_owned()))?;
-        tracing::info!(?endpoints, "listening");
-        Ok(Gateway { endpoints, counters, stopping, outbox, thread: Some(thread) })
+        tracing::info!(?open, with_keys = ?locked, "listening");
+        Ok(Gateway {
+            open,
+            locked,
+            counters,
+            stopping,
+            outbox,
+            thread: Some(thread),
+            _doorkeeper: doorkeeper,
+        })
     }
 
-    /// The outer endpoints as they are bound, with the ports that were taken.
-    pub fn endpoints(&self) -> &[String] {
-        &self.endpoints
+    /// The endpoints without keys as they are bound, with the ports that were taken.
+    pub fn open_endpoints(&self) -> &[String] {
+        &self.open
+    }
+
+    /// The endpoints with keys.
+    pub fn locked_endpoints(&self) -> &[String] {
+        &self.locked
     }
 
     pub fn counters(&self) -> &Counters {
@@ -123,41 +184,9 @@ impl Drop for Gateway {
     }
 }
 
-fn bind(
-    context: &Context,
-    inner: &str,
-    outer: &[Endpoint],
-) -> Result<(zmq::Socket, Vec<String>), GatewayError> {
-    let start = |error: zmq::Error| GatewayError::Start { reason: error.to_string() };
-    let router = context.socket(zmq::ROUTER).map_err(start)?;
-    // An answer for a peer that is gone, or that does not read, is an error that is counted; it
-    // must neither vanish silently nor block everybody else.
-    router.set_router_mandatory(true).map_err(start)?;
-    // A peer that sends larger frames than this is disconnected before its bytes fill the memory;
-    // between the two bounds it gets a sentence.
-    router.set_maxmsgsize(2 * FRAME_BYTES_MAX as i64).map_err(start)?;
-    router.set_linger(LINGER_MS).map_err(start)?;
-    router.set_ipv6(outer.iter().any(is_ipv6)).map_err(start)?;
-    router.bind(inner).map_err(start)?;
-    let mut endpoints = Vec::new();
-    for endpoint in outer {
-        let endpoint = endpoint.to_string();
-        let refused = |reason: String| GatewayError::Bind { endpoint: endpoint.clone(), reason };
-        router.bind(&endpoint).map_err(|error| refused(error.to_string()))?;
-        let bound = router.get_last_endpoint().map_err(|error| refused(error.to_string()))?;
-        endpoints.push(bound.map_err(|_| refused("its name is not UTF-8".to_owned()))?);
-    }
-    Ok((router, endpoints))
-}
-
-fn is_ipv6(endpoint: &Endpoint) -> bool {
-    matches!(endpoint, Endpoint::Loopback(address) if address.is_ipv6())
-}
-
 /// What the gateway's thread owns.
-struct Door {
-    router: zmq::Socket,
-    tenant: TenantId,
+struct Hall {
+    doors: Vec<Door>,
     front: Front,
     failure: Failure,
     counters: Arc<Counters>,
@@ -167,12 +196,12 @@ struct Door {
     outbox: Outbox<Outgoing>,
 }
 
-impl Door {
+impl Hall {
     fn serve(self, mut inbox: Inbox<Outgoing>) {
         let mut stop_by = None;
         loop {
             let timeout_ms = if stop_by.is_some() { 20 } else { 1_000 };
-            let (knock, bell) = match self.poll(&inbox, timeout_ms) {
+            let (knocks, bell) = match self.poll(&inbox, timeout_ms) {
                 Ok(ready) => ready,
                 Err(error) => {
                     self.failure.report(format!("the gateway cannot poll its socket: {error}"));
@@ -189,9 +218,11 @@ impl Door {
             if self.failure.reason().is_some() {
                 return;
             }
-            if knock && let Err(error) = self.read() {
-                self.failure.report(format!("the gateway cannot read its socket: {error}"));
-                return;
+            for place in knocks {
+                if let Err(error) = self.read(place) {
+                    self.failure.report(format!("the gateway cannot read its socket: {error}"));
+                    return;
+                }
             }
             if self.stopping.load(Ordering::SeqCst) {
                 let stop_by = *stop_by.get_or_insert_with(|| Instant::now() + DRAIN);
@@ -204,23 +235,23 @@ impl Door {
         }
     }
 
-    /// - returns: whether the ROUTER has messages, and whether the outbox has answers.
-    fn poll(&self, inbox: &Inbox<Outgoing>, timeout_ms: i64) -> zmq::Result<(bool, bool)> {
-        let mut items = [
-            self.router.as_poll_item(zmq::POLLIN),
-            zmq::PollItem::from_fd(inbox.fd(), zmq::POLLIN),
-        ];
+    /// - returns: the places of the doors that have messages, and whether the outbox has answers.
+    fn poll(&self, inbox: &Inbox<Outgoing>, timeout_ms: i64) -> zmq::Result<(Vec<usize>, bool)> {
+        let mut items = vec![zmq::PollItem::from_fd(inbox.fd(), zmq::POLLIN)];
+        items.extend(self.doors.iter().map(|door| door.socket.as_poll_item(zmq::POLLIN)));
         match zmq::poll(&mut items, timeout_ms) {
-            Ok(_) => Ok((items[0].is_readable(), items[1].is_readable())),
-            Err(zmq::Error::EINTR) => Ok((false, false)),
-            Err(error) => Err(error),
+            Ok(_) => {}
+            Err(zmq::Error::EINTR) => return Ok((Vec::new(), false)),
+            Err(error) => return Err(error),
         }
+        let readable = |place: &usize| items[place + 1].is_readable();
+        Ok(((0..self.doors.len()).filter(readable).collect(), items[0].is_readable()))
     }
 
-    fn read(&self) -> zmq::Result<()> {
+    fn read(&self, place: usize) -> zmq::Result<()> {
         for _ in 0..BURST {
-            match self.receive() {
-                Ok(message) => self.take(message),
+            match self.doors[place].receive() {
+                Ok(message) => self.take(place, message),
                 Err(zmq::Error::EAGAIN) => return Ok(()),
                 Err(zmq::Error::EINTR) => continue,
                 Err(error) => return Err(error),
@@ -229,54 +260,60 @@ impl Door {
         Ok(())
     }
 
-    /// One whole message, of which no more than [`FRAMES_MAX`] frames are kept; the bool says
-    /// whether there were more.
-    fn receive(&self) -> zmq::Result<(Vec<Vec<u8>>, bool)> {
-        let mut frames = vec![self.router.recv_bytes(zmq::DONTWAIT)?];
-        let mut too_many = false;
-        while self.router.get_rcvmore()? {
-            // The frames of one message arrive together: this does not wait.
-            let frame = self.router.recv_msg(0)?;
-            match frames.len() < FRAMES_MAX {
-                true => frames.push(frame.to_vec()),
-                false => too_many = true,
-            }
-        }
-        Ok((frames, too_many))
-    }
-
-    fn take(&self, (frames, too_many): (Vec<Vec<u8>>, bool)) {
+    fn take(&self, place: usize, Incoming { frames, too_many, sender }: Incoming) {
         sabotage::point("gateway");
         let counters = &self.counters;
-        counters.received.fetch_add(1, Ordering::Relaxed);
+        count(&counters.received);
         let mut frames = frames.into_iter();
         let Some(routing_id) = frames.next() else { return };
         let mut rest: Vec<Vec<u8>> = frames.collect();
+        if let Sender::Unvouched = sender {
+            // Nothing is said to whoever came in although nobody answered their handshake.
+            tracing::warn!("dropped a message from a connection that nobody vouched for");
+            return count(&counters.unvouched);
+        }
         let delimiter = rest.len() > 1 && rest[0].is_empty();
         if delimiter {
             rest.remove(0);
         }
-        let peer = Peer { routing_id, delimiter };
+        let own_address = self.doors[place].is_own_address(&routing_id);
+        let peer = Peer { door: place, routing_id, delimiter };
         if too_many || rest.len() != 1 {
             // Which of the frames was meant to carry the id cannot be known.
             tracing::debug!(frames = rest.len(), "dropped a message that is not one frame");
-            counters.dropped.fetch_add(1, Ordering::Relaxed);
-            return;
+            return count(&counters.dropped);
         }
-        match wire::decode_request(&rest[0]) {
-            Ok(request) => self.submit(peer, request),
-            Err(Refused { id: Some(id), failed }) => {
-                counters.refused.fetch_add(1, Ordering::Relaxed);
-                self.answer(peer, id, Response::Error(failed));
+        let read = wire::decode_request(&rest[0]);
+        let id = match &read {
+            Ok(request) => Some(request.id),
+            Err(refused) => refused.id,
+        };
+        let Some(id) = id else {
+            tracing::debug!("dropped a message without a request id");
+            return count(&counters.dropped);
+        };
+        let caller = match sender {
+            Sender::Known(caller) if own_address => caller,
+            Sender::Known(_) => return self.deny(peer, id, rights::routing_id_chosen()),
+            Sender::NotAdmitted(key) => {
+                tracing::debug!(%key, "denied a message of a key that is not admitted");
+                return self.deny(peer, id, rights::not_admitted());
             }
-            Err(Refused { id: None, failed }) => {
-                counters.dropped.fetch_add(1, Ordering::Relaxed);
-                tracing::debug!(code = ?failed.code, "dropped a message without a request id");
+            Sender::Unvouched => return,
+        };
+        match read {
+            Ok(request) => match caller.may(&request.ask) {
+                Ok(()) => self.submit(peer, caller, request),
+                Err(failed) => self.deny(peer, id, failed),
+            },
+            Err(Refused { failed, .. }) => {
+                count(&counters.refused);
+                self.answer(peer, id, Response::Error(failed));
             }
         }
     }
 
-    fn submit(&self, peer: Peer, request: wire::Request) {
+    fn submit(&self, peer: Peer, caller: Caller, request: wire::Request) {
         let wire::Request { id, user, ask } = request;
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
@@ -289,11 +326,11 @@ impl Door {
             outbox.put(Outgoing { peer, bytes });
             in_flight.fetch_sub(1, Ordering::SeqCst);
         });
-        let submit = Submit { tenant: self.tenant.clone(), user, request: id, ask, answer };
+        let submit = Submit { tenant: caller.tenant(), user, request: id, ask, answer };
         match self.front.submit(submit) {
             Ok(()) => {}
             Err(NotTaken::Full(submit)) => {
-                self.counters.busy.fetch_add(1, Ordering::Relaxed);
+                count(&self.counters.busy);
                 let full = "the service has too many requests in hand";
                 submit.answer.send(Response::busy(full, RETRY_FULL_MS));
             }
@@ -302,7 +339,7 @@ impl Door {
                     Response::QuotaExceeded(_) => &self.counters.over_quota,
                     _ => &self.counters.busy,
                 };
-                counter.fetch_add(1, Ordering::Relaxed);
+                count(counter);
                 submit.answer.send(*response);
             }
             Err(NotTaken::Closed(submit)) => {
@@ -313,8 +350,13 @@ impl Door {
         }
     }
 
+    fn deny(&self, peer: Peer, id: RequestId, failed: Failed) {
+        count(&self.counters.denied);
+        self.answer(peer, id, Response::Error(failed));
+    }
+
     fn busy(&self, peer: Peer, id: RequestId, why: &str) {
-        self.counters.busy.fetch_add(1, Ordering::Relaxed);
+        count(&self.counters.busy);
         self.answer(peer, id, Response::busy(why, RETRY_FULL_MS));
     }
 
@@ -323,59 +365,16 @@ impl Door {
     }
 
     fn send(&self, Outgoing { peer, bytes }: Outgoing) {
+        let door = &self.doors[peer.door];
         let mut frames = vec![peer.routing_id];
         if peer.delimiter {
             frames.push(Vec::new());
         }
         frames.push(bytes);
-        match self.router.send_multipart(frames, zmq::DONTWAIT) {
-            Ok(()) => self.counters.answered.fetch_add(1, Ordering::Relaxed),
+        match door.socket.send_multipart(frames, zmq::DONTWAIT) {
+            Ok(()) => count(&self.counters.answered),
             // Gone, or not reading. A retry with the same id finds the answer in the log.
-            Err(_) => self.counters.undelivered.fetch_add(1, Ordering::Relaxed),
-        };
-    }
-}
-
-/// What came through the door since it was opened.
-#[derive(Debug, Default)]
-pub struct Counters {
-    received: AtomicU64,
-    answered: AtomicU64,
-    dropped: AtomicU64,
-    refused: AtomicU64,
-    busy: AtomicU64,
-    over_quota: AtomicU64,
-    undelivered: AtomicU64,
-}
-
-/// [`Counters`] at one moment, in messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    pub received: u64,
-    pub answered: u64,
-    /// Malformed beyond an answer: not one frame, or no request id.
-    pub dropped: u64,
-    /// Answered with an error, because they were no request.
-    pub refused: u64,
-    /// Turned away by the gateway itself because of too much work.
-    pub busy: u64,
-    /// Turned away by the gateway because their tenant takes more than it may.
-    pub over_quota: u64,
-    /// Answers whose peer was gone or did not read.
-    pub undelivered: u64,
-}
-
-impl Counters {
-    pub fn now(&self) -> Counts {
-        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        Counts {
-            received: read(&self.received),
-            answered: read(&self.answered),
-            dropped: read(&self.dropped),
-            refused: read(&self.refused),
-            busy: read(&self.busy),
-            over_quota: read(&self.over_quota),
-            undelivered: read(&self.undelivered),
+            Err(_) => count(&self.counters.undelivered),
         }
     }
 }

@@ -2,14 +2,26 @@
 //! described for strangers in `schema/wire.md`.
 
 mod client;
+mod clock;
+mod counters;
+mod curve_keys;
+mod door;
 mod endpoint;
 mod gateway;
+mod knock;
+mod lock;
 mod outbox;
+mod rights;
 pub mod wire;
+mod z85;
+mod zap;
 
-pub use client::{Client, ClientError, fresh_id};
+pub use client::{Client, ClientError, Identity, fresh_id};
+pub use counters::{Counters, Counts};
+pub use curve_keys::{CurveKey, CurveKeyError, public_file, read_public};
 pub use endpoint::{Endpoint, EndpointError};
-pub use gateway::{Counters, Counts, Gateway, GatewayError};
+pub use gateway::{Doors, Gateway, GatewayError, LockedDoor};
+pub use z85::show as show_key;
 
 /// A ZeroMQ context: what a client inside the process shares with the gateway.
 pub type Context = zmq::Context;

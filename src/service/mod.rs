@@ -2,16 +2,19 @@
 //! and so does any program that wants the service inside itself (`examples/embed.rs`).
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use crate::actors::{ActorsError, Failure, House, HouseSettings, Usage, Wakings};
-use crate::frontends::{
-    Client, ClientError, Context, Counts, Endpoint, EndpointError, Gateway, GatewayError,
+use crate::actors::{
+    ActorsError, Erased, Failure, House, HouseSettings, OrderError, Registrar, Usage, Wakings,
 };
-use crate::ids::{TenantId, UserId};
+use crate::frontends::{
+    Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
+    Gateway, GatewayError, LockedDoor,
+};
+use crate::ids::{PublicKey, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::limits::AWAKE_USERS_MAX;
 use crate::store::{self, FaultPlan};
@@ -25,8 +28,14 @@ pub struct Config<D: Domain> {
     /// The recipe (TOML) that new people start with. People who are known keep theirs.
     pub recipe_text: String,
     /// Endpoints beside the one inside the process: `tcp://127.0.0.1:PORT` (0 takes a free port),
-    /// `tcp://[::1]:PORT`, `ipc://PATH`.
+    /// `tcp://[::1]:PORT`, `ipc://PATH`. Whoever reaches them is the single user of this machine:
+    /// tenant `local`, and its operator.
     pub listen: Vec<String>,
+    /// Endpoints where only those come in whose key was admitted; any address will do.
+    pub listen_curve: Vec<String>,
+    /// The file of the service's own CURVE key, made when missing; none: `keys/server.curve` in the
+    /// data directory.
+    pub server_key: Option<PathBuf>,
     /// Trainings at once.
     pub trainers: usize,
     /// People awake at once.
@@ -49,6 +58,8 @@ pub enum StartError {
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
     #[error(transparent)]
+    ServerKey(#[from] CurveKeyError),
+    #[error(transparent)]
     Store(#[from] store::OpenError),
     #[error("the fault drill cannot be started: {0}")]
     Drill(std::io::Error),
@@ -65,6 +76,12 @@ pub struct Service {
     house: House,
     context: Context,
     failure: Failure,
+    server_key: Option<PublicKey>,
+}
+
+/// Where a data directory keeps the service's own CURVE key. Not named `.key`: those are tenants'.
+pub fn server_key_file(directory: &Path) -> PathBuf {
+    directory.join("keys/server.curve")
 }
 
 /// The endpoint inside the process; each service has a context, so that names do not meet.
@@ -79,6 +96,8 @@ impl<D: Domain> Config<D> {
             data,
             recipe_text: recipe.to_owned(),
             listen: Vec::new(),
+            listen_curve: Vec::new(),
+            server_key: None,
             trainers: cores(),
             awake_max: AWAKE_USERS_MAX,
             faults: None,
@@ -94,8 +113,10 @@ impl Service {
     /// Opens the store, trains the base mind, and opens the doors, in this order: nobody is
     /// answered by a service that is not ready.
     pub fn start<D: Domain>(config: Config<D>) -> Result<Service, StartError> {
-        let outer = config.listen.iter().map(|text| Endpoint::parse(text));
-        let outer: Vec<Endpoint> = outer.collect::<Result<_, _>>()?;
+        let open = config.listen.iter().map(|text| Endpoint::parse_open(text));
+        let open: Vec<Endpoint> = open.collect::<Result<_, _>>()?;
+        let locked = config.listen_curve.iter().map(|text| Endpoint::parse(text));
+        let locked: Vec<Endpoint> = locked.collect::<Result<_, _>>()?;
         let failure = Failure::default();
         let store = match &config.data {
             Data::Directory(path) => store::open(path)?,
@@ -104,6 +125,15 @@ impl Service {
         let store = match config.faults {
             Some(plan) => store.under(plan).map_err(StartError::Drill)?,
             None => store,
+        };
+        // After the directory was locked: two processes must not make its key at once.
+        let key = match (locked.is_empty(), &config.server_key, &config.data) {
+            (true, _, _) => None,
+            (false, Some(file), _) => Some(CurveKey::read_or_make(file)?),
+            (false, None, Data::Directory(directory)) => {
+                Some(CurveKey::read_or_make(&server_key_file(directory))?)
+            }
+            (false, None, Data::Memory) => Some(CurveKey::new()?),
         };
         let house = House::start(HouseSettings {
             domain: config.domain,
@@ -115,9 +145,12 @@ impl Service {
             failure: failure.clone(),
         })?;
         let context = Context::new();
-        let (tenant, front) = (TenantId::local(), house.front());
-        let gateway = Gateway::open(&context, INNER, &outer, tenant, front, failure.clone())?;
-        Ok(Service { gateway, house, context, failure })
+        let admissions = house.registrar().admissions().clone();
+        let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key, admissions });
+        let doors = Doors { inner: INNER, open: &open, locked };
+        let gateway = Gateway::open(&context, doors, house.front(), failure.clone())?;
+        let server_key = key.map(|key| *key.public());
+        Ok(Service { gateway, house, context, failure, server_key })
     }
 
     /// A client inside this process.
@@ -125,13 +158,42 @@ impl Service {
         Client::within(&self.context, INNER, user)
     }
 
-    /// The first endpoint that other processes can reach, with the port that was taken.
+    /// The first endpoint without keys that other processes can reach, with the port that was taken.
     pub fn endpoint(&self) -> Option<&str> {
         self.endpoints().first().map(String::as_str)
     }
 
+    /// The endpoints without keys.
     pub fn endpoints(&self) -> &[String] {
-        self.gateway.endpoints()
+        self.gateway.open_endpoints()
+    }
+
+    /// The endpoints with keys.
+    pub fn curve_endpoints(&self) -> &[String] {
+        self.gateway.locked_endpoints()
+    }
+
+    /// Where orders about tenants are handed in from inside the process.
+    pub fn registrar(&self) -> &Registrar {
+        self.house.registrar()
+    }
+
+    /// The service's own public key, when it has a door with keys.
+    pub fn server_key(&self) -> Option<&PublicKey> {
+        self.server_key.as_ref()
+    }
+
+    /// Erases a person while the service runs: their key is destroyed, their minds and snapshots go,
+    /// and the tenant's stream says so, signed. Blocks.
+    ///
+    /// - errors: nobody of that name, or what stood in the way.
+    pub fn erase(&self, tenant: TenantId, user: UserId) -> Erased {
+        let (sender, receiver) = mpsc::channel();
+        self.house.erase(tenant, user, move |erased| {
+            // Nobody waits any more when the service was dropped meanwhile.
+            let _ = sender.send(erased);
+        });
+        receiver.recv().unwrap_or(Err(OrderError::Gone))
     }
 
     /// What came through the doors.

@@ -2,7 +2,7 @@
 
 mod show;
 
-pub use show::json;
+pub use show::{json, readable};
 
 use std::io::Write;
 

@@ -1,0 +1,70 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::data_dir;
+use super::failure::Failure;
+use crate::frontends::{CurveKey, show_key};
+use crate::service::server_key_file;
+
+/// Make and show the keys by which services and labs know each other.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice keys new --out lab.key
+  apprentice keys show --file lab.key
+  apprentice keys show --data labs
+
+A key file is for its owner alone; what others need is the public half, which is printed and stands
+in FILE.pub. The files are ZeroMQ certificates, which other programs read too.
+
+Exit codes: 0 done, 2 a file that cannot be used.")]
+pub struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Make a key for a gateway, an operator or an auditor, and print its public half.
+    New {
+        /// Where the secret half goes, readable by you alone; the public half goes to FILE.pub.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
+    /// Print the public half of a key: of a file, or of the service in a data directory.
+    Show {
+        /// A key file.
+        #[arg(long, value_name = "FILE", conflicts_with = "data")]
+        file: Option<PathBuf>,
+        /// A data directory, whose service has a key since it first listened with --curve
+        /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+        #[arg(long, value_name = "DIR")]
+        data: Option<PathBuf>,
+    },
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let key = match arguments.verb {
+        Verb::New { out } => {
+            let key = CurveKey::new().map_err(Failure::failed)?;
+            let public = key.write_new(&out).map_err(Failure::bad_input)?;
+            eprintln!("apprentice: the secret half is in {}; keep it", out.display());
+            eprintln!("apprentice: the public half is in {}", public.display());
+            key
+        }
+        Verb::Show { file: Some(file), .. } => CurveKey::read(&file).map_err(Failure::bad_input)?,
+        Verb::Show { file: None, data } => {
+            let file = server_key_file(&data_dir::choose(data)?);
+            CurveKey::read(&file).map_err(|error| match error {
+                crate::frontends::CurveKeyError::Absent { path } => Failure::bad_input(format!(
+                    "there is no key of a service at {path}; it is made when the service first \
+                     listens with `apprentice serve --curve`"
+                )),
+                error => Failure::bad_input(error),
+            })?
+        }
+    };
+    println!("{}", show_key(key.public()));
+    Ok(())
+}

@@ -1,0 +1,265 @@
+//! Who is let in: ZeroMQ asks for each connection at the door with keys (ZAP, RFC 27), and a thread
+//! of its own answers from the register of admitted keys.
+//!
+//! Three things keep a stranger out, each of them enough: the answer to the handshake; the register,
+//! which is asked again for each message, so that an open connection ends with its key; and the
+//! [`Seal`], because a server whose ZAP thread is gone would let everybody in.
+
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+use super::Context;
+use super::counters::{Counters, count};
+use super::outbox::{Inbox, Outbox};
+use crate::actors::Failure;
+use crate::ids::PublicKey;
+use crate::sabotage;
+use crate::tenancy::Admissions;
+
+/// Where ZeroMQ looks for whoever answers; one for each context.
+const ADDRESS: &str = "inproc://zeromq.zap.01";
+/// Names the door with keys in ZeroMQ's questions.
+pub(super) const DOMAIN: &str = "apprentice";
+/// More frames than this are not kept; ZeroMQ itself never sends so many.
+const FRAMES_READ_MAX: usize = 16;
+
+/// A secret of one service that turns a key into what ZeroMQ keeps as the `User-Id` of a connection.
+/// A client can send a `User-Id` of its own, which counts when nobody answered the handshake; it
+/// cannot guess this.
+#[derive(Clone)]
+pub(super) struct Seal(String);
+
+impl Seal {
+    pub fn fresh() -> Seal {
+        let mut bytes = [0; 16];
+        getrandom::fill(&mut bytes).expect("the operating system gives random bytes");
+        Seal(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    fn stamp(&self, key: &PublicKey) -> String {
+        format!("{}:{key}", self.0)
+    }
+
+    /// The key of a connection whose handshake was answered here.
+    pub fn key_of(&self, user_id: &str) -> Option<PublicKey> {
+        user_id.strip_prefix(self.0.as_str())?.strip_prefix(':')?.parse().ok()
+    }
+}
+
+/// The thread that answers handshakes. Ends when dropped, which must come after the sockets that
+/// need it are closed.
+#[derive(Debug)]
+pub(super) struct Doorkeeper {
+    bell: Outbox<()>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// What the thread owns. The guard comes first, so that the end is reported before the socket is
+/// closed: from then on handshakes fail open.
+struct Desk<W: Fn()> {
+    guard: Guard<W>,
+    socket: zmq::Socket,
+    inbox: Inbox<()>,
+    seal: Seal,
+    admissions: Admissions,
+    counters: Arc<Counters>,
+}
+
+/// Reports the end of the thread, however it ends, unless it was told to end.
+struct Guard<W: Fn()> {
+    failure: Failure,
+    /// Wakes whoever must see the failure.
+    wake: W,
+    told: bool,
+}
+
+impl<W: Fn()> Drop for Guard<W> {
+    fn drop(&mut self) {
+        if !self.told {
+            self.failure.report("the thread that answers handshakes ended");
+            (self.wake)();
+        }
+    }
+}
+
+impl Doorkeeper {
+    /// Must be there before the first socket that needs it listens.
+    ///
+    /// - `wake`: called when the thread ended without having been told to, after that was reported.
+    /// - errors: why it did not start.
+    pub fn start(
+        context: &Context,
+        seal: Seal,
+        admissions: Admissions,
+        counters: Arc<Counters>,
+        failure: Failure,
+        wake: impl Fn() + Send + 'static,
+    ) -> Result<Doorkeeper, String> {
+        let socket = context.socket(zmq::REP).map_err(|error| error.to_string())?;
+        socket
+            .set_linger(0)
+            .and_then(|()| socket.bind(ADDRESS))
+            .map_err(|error| format!("handshakes cannot be answered: {error}"))?;
+        let (bell, inbox) = Outbox::new().map_err(|error| error.to_string())?;
+        let guard = Guard { failure: failure.clone(), wake, told: false };
+        let mut desk = Desk { guard, socket, inbox, seal, admissions, counters };
+        let thread = thread::Builder::new()
+            .name("doorkeeper".to_owned())
+            .spawn(move || {
+                if let Err(error) = desk.serve() {
+                    failure.report(format!("handshakes cannot be answered any more: {error}"));
+                }
+            })
+            .map_err(|error| error.to_string())?;
+        Ok(Doorkeeper { bell, thread: Some(thread) })
+    }
+}
+
+impl Drop for Doorkeeper {
+    fn drop(&mut self) {
+        self.bell.put(());
+        if let Some(thread) = self.thread.take() {
+            // A panic in there was reported by its alarm.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl<W: Fn()> Desk<W> {
+    fn serve(&mut self) -> zmq::Result<()> {
+        loop {
+            let mut items = [
+                self.socket.as_poll_item(zmq::POLLIN),
+                zmq::PollItem::from_fd(self.inbox.fd(), zmq::POLLIN),
+            ];
+            match zmq::poll(&mut items, -1) {
+                Ok(_) | Err(zmq::Error::EINTR) => {}
+                Err(error) => return Err(error),
+            }
+            let (asked, told) = (items[0].is_readable(), items[1].is_readable());
+            if told && !self.inbox.drain().is_empty() {
+                self.guard.told = true;
+                return Ok(());
+            }
+            if asked {
+                sabotage::point("doorkeeper");
+                let question = match self.question() {
+                    Ok(question) => question,
+                    Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => continue,
+                    Err(error) => return Err(error),
+                };
+                let answer = self.answer(&question);
+                self.socket.send_multipart(answer, 0)?;
+            }
+        }
+    }
+
+    fn question(&self) -> zmq::Result<Vec<Vec<u8>>> {
+        let mut frames = vec![self.socket.recv_bytes(zmq::DONTWAIT)?];
+        while self.socket.get_rcvmore()? {
+            let frame = self.socket.recv_bytes(0)?;
+            if frames.len() < FRAMES_READ_MAX {
+                frames.push(frame);
+            }
+        }
+        Ok(frames)
+    }
+
+    /// Version, request id, status code, status text, user id, metadata.
+    fn answer(&self, question: &[Vec<u8>]) -> [Vec<u8>; 6] {
+        let (code, text, user_id) = match self.judge(question) {
+            Ok(key) => {
+                count(&self.counters.handshakes);
+                ("200", "", self.seal.stamp(&key))
+            }
+            Err((code, text)) => {
+                count(&self.counters.handshakes_denied);
+                // At debug level: a stranger must not be able to fill the operator's log.
+                tracing::debug!(code, text, "a connection was not let in");
+                (code, text, String::new())
+            }
+        };
+        let id = question.get(1).cloned().unwrap_or_default();
+        let (code, text) = (code.as_bytes().to_vec(), text.as_bytes().to_vec());
+        [b"1.0".to_vec(), id, code, text, user_id.into_bytes(), Vec::new()]
+    }
+
+    /// A question has version, request id, domain, address, routing id, mechanism and key.
+    ///
+    /// - errors: the status code and text. Whether a key is unknown, retired or its lab closed is
+    ///   not told: a stranger must not learn which keys there are.
+    fn judge(&self, question: &[Vec<u8>]) -> Result<PublicKey, (&'static str, &'static str)> {
+        let [version, _, domain, _, _, mechanism, key] = question else {
+            return Err(("500", "not a question about a CURVE key"));
+        };
+        if version != b"1.0" || domain != DOMAIN.as_bytes() || mechanism != b"CURVE" {
+            return Err(("500", "not a question about a CURVE key"));
+        }
+        let denied = ("400", "not admitted");
+        let key = PublicKey(key.as_slice().try_into().map_err(|_| denied)?);
+        match self.admissions.admit(&key, super::clock::now()) {
+            Some(_) => Ok(key),
+            None => Err(denied),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A doorkeeper, and a socket that asks it what ZeroMQ asks.
+    fn desk() -> (Doorkeeper, zmq::Socket, Failure) {
+        let (context, failure) = (Context::new(), Failure::default());
+        let (admissions, counters) = (Admissions::default(), Arc::default());
+        let keeper = Doorkeeper::start(
+            &context,
+            Seal::fresh(),
+            admissions,
+            counters,
+            failure.clone(),
+            || {},
+        );
+        let socket = context.socket(zmq::REQ).unwrap();
+        socket.connect(ADDRESS).unwrap();
+        (keeper.unwrap(), socket, failure)
+    }
+
+    #[test]
+    fn questions_that_are_none_are_answered_with_an_error_and_the_next_one_is_heard() {
+        let (keeper, socket, failure) = desk();
+        let key = [7u8; 32];
+        let question = |version: &'static [u8], domain: &'static [u8], key: &'static [u8]| {
+            vec![version, b"1", domain, b"127.0.0.1", b"", b"CURVE", key]
+        };
+        let short: &'static [u8] = b"short";
+        let key: &'static [u8] = Box::leak(Box::new(key));
+        for (asked, code) in [
+            (question(b"1.0", b"apprentice", key), "400"),
+            (question(b"1.0", b"apprentice", short), "400"),
+            (question(b"9.0", b"apprentice", key), "500"),
+            (question(b"1.0", b"elsewhere", key), "500"),
+            (vec![&b"1.0"[..]], "500"),
+            (vec![&b""[..]; 40], "500"),
+        ] {
+            socket.send_multipart(asked, 0).unwrap();
+            let answer = socket.recv_multipart(0).unwrap();
+            assert_eq!(answer.len(), 6);
+            assert_eq!(answer[2], code.as_bytes());
+            assert!(answer[4].is_empty(), "nobody is named who is not let in");
+        }
+        drop(keeper);
+        assert_eq!(failure.reason(), None, "an end that was asked for is no failure");
+    }
+
+    #[test]
+    fn a_user_id_that_was_not_given_here_names_nobody() {
+        let (seal, other) = (Seal::fresh(), Seal::fresh());
+        let key = PublicKey([9; 32]);
+        assert_eq!(seal.key_of(&seal.stamp(&key)), Some(key));
+        let forged = [other.stamp(&key), key.to_string(), format!(":{key}"), String::new()];
+        for user_id in forged {
+            assert_eq!(seal.key_of(&user_id), None, "{user_id}");
+        }
+    }
+}
