@@ -313,6 +313,10 @@ impl EventLog for Tampered {
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.inner.log.walk(stream)
     }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.inner.log.sealed_bytes(tenant)
+    }
 }
 
 /// Seals `record` again behind `after`.

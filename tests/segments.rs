@@ -134,6 +134,10 @@ impl EventLog for Forged {
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.of(stream).walk(stream)
     }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.original.sealed_bytes(tenant)
+    }
 }
 
 /// The store with the records of one stream rewritten by somebody who holds every key: chains and

@@ -59,6 +59,7 @@ impl Book {
             // Going on with a log that is not the one that was signed could never be mended.
             replay::newest_checkpoint(&book.store, &tenant, &registry)
                 .map_err(|error| OrderError::Evidence { tenant: tenant.clone(), error })?;
+            count_bytes(&book.store, &tenant, &registry);
             book.admissions.update(&tenant, registry.standing());
             book.registries.insert(tenant, registry);
         }
@@ -115,6 +116,7 @@ impl Book {
                 .apply(record)
                 .map_err(|error| OrderError::Disagreement { tenant: tenant.clone(), error })?;
         }
+        count_bytes(&self.store, tenant, registry);
         self.admissions.update(tenant, registry.standing());
         Ok(events)
     }
@@ -239,6 +241,16 @@ impl Book {
             }
         }
         Ok(())
+    }
+}
+
+/// The first count of a tenant's bytes reads all of them: it is made here, before the doors know of
+/// a limit to hold it against, so that no door waits for it.
+fn count_bytes(store: &Store, tenant: &TenantId, registry: &Registry) {
+    if registry.standing().quotas().sealed_bytes.is_some()
+        && let Err(error) = store.log.sealed_bytes(tenant)
+    {
+        tracing::error!(%tenant, %error, "the count of a tenant's bytes failed");
     }
 }
 

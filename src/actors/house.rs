@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -9,9 +10,10 @@ use super::awake::AwakeCount;
 use super::directory::{Address, Directory, People, SleepAll, Waking};
 use super::farewell::Farewell;
 use super::life::{Life, Parts};
+use super::meters::{Meters, Usage};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{Book, Erased, Failure, Hello, OrderError, Registrar, Submit};
+use super::{Book, Erased, Failure, Hello, OrderError, Registrar, Response, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
@@ -22,6 +24,7 @@ use crate::world::Domain;
 pub struct House {
     directory: Addr<Directory>,
     registrar: Registrar,
+    meters: Arc<Meters>,
     system: System,
     thread: Option<JoinHandle<()>>,
     failure: Failure,
@@ -70,19 +73,28 @@ pub enum ActorsError {
 
 /// Where front ends hand in requests. Knows no domain.
 #[derive(Clone)]
-pub struct Front(Recipient<Submit>);
+pub struct Front {
+    directory: Recipient<Submit>,
+    meters: Arc<Meters>,
+}
 
 /// A request that was not taken, given back.
 pub enum NotTaken {
     /// Too many are waiting.
     Full(Box<Submit>),
+    /// Its tenant has too much of something, or all together have; this is what to answer.
+    Over(Box<Submit>, Box<Response>),
     /// Nobody is there any more.
     Closed(Box<Submit>),
 }
 
 impl Front {
-    pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
-        self.0.try_send(submit).map_err(|error| match error {
+    pub fn submit(&self, mut submit: Submit) -> Result<(), NotTaken> {
+        match self.meters.admit(&submit.tenant, &submit.ask) {
+            Ok(in_flight) => submit.answer.let_in(in_flight),
+            Err(response) => return Err(NotTaken::Over(Box::new(submit), response)),
+        }
+        self.directory.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
             SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
         })
@@ -112,12 +124,15 @@ impl House {
         let minds = Arc::<Minds>::default();
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
         let book = Book::open(store.clone())?;
+        let meters = Arc::new(Meters::new(book.admissions().clone(), store.log.clone()));
         let parts = Parts {
             domain,
             store,
             recipe,
             recipe_text,
+            trainers,
             minds: minds.clone(),
+            meters: meters.clone(),
             failure: failure.clone(),
             open: lives.enter(),
         };
@@ -126,6 +141,7 @@ impl House {
         let (started, ready) = mpsc::channel();
         let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
         let (failed, book_open) = (failure.clone(), lives.enter());
+        let measured = meters.clone();
         let thread = thread::Builder::new()
             .name("actors".to_owned())
             .spawn(move || {
@@ -133,8 +149,8 @@ impl House {
                 let system = System::new();
                 let (directory, registrar) = system.block_on(async move {
                     let registrar = Registrar::start(book, book_open, failed);
-                    let life = Life::start(parts, registrar.clone(), |life| {
-                        SyncArbiter::start(trainers.max(1), move || Trainer { life: life.clone() })
+                    let life = Life::start(parts, registrar.clone(), |life, trainers| {
+                        SyncArbiter::start(trainers, move || Trainer { life: life.clone() })
                     });
                     let arbiters: Vec<Arbiter> =
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
@@ -142,7 +158,8 @@ impl House {
                     let people = Box::new(Homes { life, homes });
                     let for_directory = registrar.clone();
                     let directory =
-                        Directory::new(people, awake_max, hello, count, for_directory).start();
+                        Directory::new(people, awake_max, hello, count, measured, for_directory)
+                            .start();
                     (directory, registrar)
                 });
                 let _ = started.send((directory, registrar, System::current()));
@@ -158,6 +175,7 @@ impl House {
         Ok(House {
             directory,
             registrar,
+            meters,
             system,
             thread,
             failure,
@@ -170,7 +188,12 @@ impl House {
     }
 
     pub fn front(&self) -> Front {
-        Front(self.directory.clone().recipient())
+        Front { directory: self.directory.clone().recipient(), meters: self.meters.clone() }
+    }
+
+    /// What each tenant takes, and how often it was turned away.
+    pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
+        self.meters.usage()
     }
 
     /// Where orders about tenants are handed in.

@@ -7,6 +7,7 @@ mod failure;
 mod farewell;
 mod house;
 mod life;
+mod meters;
 mod registrar;
 mod response;
 mod submit;
@@ -16,6 +17,9 @@ mod user;
 pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
+pub use meters::{Refusals, Usage};
 pub use registrar::{Erased, Obeyed, Registrar, Signed};
-pub use response::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
+pub use response::{
+    Ask, Busy, ErrorCode, Failed, Hello, Quota, QuotaExceeded, Rejected, Response, Waited,
+};
 pub use submit::{AnswerTo, Submit};

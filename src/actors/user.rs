@@ -266,22 +266,19 @@ impl<D: Domain> UserActor<D> {
             return;
         }
         let Some(Outstanding::Retrain { recipe, lessons }) = session.outstanding() else { return };
-        let Some(place) = self.life.place_in_queue() else {
-            tracing::warn!(stream = %self.waking.stream, "the trainers' queue is full; asking again");
-            ctx.run_later(Duration::from_secs(TRAIN_AGAIN_S), |actor, ctx| {
-                actor.ask_for_training(ctx);
-            });
-            return;
-        };
-        self.training = true;
-        self.life.trainer().do_send(Train {
+        self.training = self.life.queue_training(Train {
             stream: self.waking.stream.clone(),
             recipe,
             lessons,
             tell: ctx.address().recipient(),
-            place,
             attention: self.waking.presence.attend(),
         });
+        if !self.training {
+            tracing::warn!(stream = %self.waking.stream, "the tenant's queue for training is full");
+            ctx.run_later(Duration::from_secs(TRAIN_AGAIN_S), |actor, ctx| {
+                actor.ask_for_training(ctx);
+            });
+        }
     }
 
     /// The state did not change: the turn is dropped. When it is certain that nothing was appended

@@ -13,7 +13,6 @@ use super::zap::{Doorkeeper, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
 use crate::actors::{AnswerTo, ErrorCode, Failed, Failure, Front, NotTaken, Response, Submit};
 use crate::ids::RequestId;
-use crate::limits::GATEWAY_IN_FLIGHT_MAX;
 use crate::sabotage;
 use crate::tenancy::Admissions;
 
@@ -319,9 +318,6 @@ impl Hall {
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
         }
-        if self.in_flight.load(Ordering::SeqCst) >= GATEWAY_IN_FLIGHT_MAX {
-            return self.busy(peer, id, "the service has too many requests in hand");
-        }
         self.in_flight.fetch_add(1, Ordering::SeqCst);
         let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
         let answer = AnswerTo::new(move |response| {
@@ -337,6 +333,14 @@ impl Hall {
                 count(&self.counters.busy);
                 let full = "the service has too many requests in hand";
                 submit.answer.send(Response::busy(full, RETRY_FULL_MS));
+            }
+            Err(NotTaken::Over(submit, response)) => {
+                let counter = match *response {
+                    Response::QuotaExceeded(_) => &self.counters.over_quota,
+                    _ => &self.counters.busy,
+                };
+                count(counter);
+                submit.answer.send(*response);
             }
             Err(NotTaken::Closed(submit)) => {
                 self.failure.report("the directory of people is gone");

@@ -6,7 +6,9 @@ use std::io::Cursor;
 use serde::de::{DeserializeOwned, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::actors::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
+use crate::actors::{
+    Ask, Busy, ErrorCode, Failed, Hello, QuotaExceeded, Rejected, Response, Waited,
+};
 use crate::ids::{RequestId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
 use crate::session::{Command, KnownExemplar, Query, Reply, Status};
@@ -223,6 +225,8 @@ struct ResponseMap {
     #[serde(skip_serializing_if = "Option::is_none")]
     busy: Option<Busy>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    quota_exceeded: Option<QuotaExceeded>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<Failed>,
 }
 
@@ -240,6 +244,7 @@ pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
         Response::Hello(hello) => map.hello = Some(hello),
         Response::Rejected(rejected) => map.rejected = Some(rejected),
         Response::Busy(busy) => map.busy = Some(busy),
+        Response::QuotaExceeded(over) => map.quota_exceeded = Some(over),
         Response::Error(failed) => map.error = Some(failed),
     }
     pack(&map)
@@ -263,6 +268,7 @@ pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
         map.hello.map(Response::Hello),
         map.rejected.map(Response::Rejected),
         map.busy.map(Response::Busy),
+        map.quota_exceeded.map(Response::QuotaExceeded),
         map.error.map(Response::Error),
     ];
     let mut found = found.into_iter().flatten();

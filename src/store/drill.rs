@@ -107,6 +107,10 @@ impl EventLog for Drill {
         self.faulty.walk(stream)
     }
 
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.faulty.sealed_bytes(tenant)
+    }
+
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         self.faulty.streams(tenant)
     }

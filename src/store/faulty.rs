@@ -242,6 +242,11 @@ impl EventLog for FaultyLog {
         self.alive()?;
         self.inner.walk(stream)
     }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.alive()?;
+        self.inner.sealed_bytes(tenant)
+    }
 }
 
 #[cfg(test)]

@@ -41,6 +41,10 @@ pub trait EventLog: Send + Sync {
     ///
     /// - returns: the last record.
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError>;
+
+    /// Bytes of all framed records of a tenant that are durable. The first call may read all of
+    /// them; later ones cost nothing.
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError>;
 }
 
 /// What [`EventLog::sealed`] gives.

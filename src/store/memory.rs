@@ -13,6 +13,8 @@ use crate::ids::{Seq, StreamId, StreamKey, TenantId};
 pub struct MemoryLog {
     keys: Arc<Keys>,
     streams: RwLock<BTreeMap<TenantId, BTreeMap<StreamKey, Stream>>>,
+    /// Of all frames of a tenant.
+    bytes: RwLock<BTreeMap<TenantId, u64>>,
 }
 
 struct Stream {
@@ -42,7 +44,7 @@ impl Stream {
 
 impl MemoryLog {
     pub fn new(keys: Arc<Keys>) -> MemoryLog {
-        MemoryLog { keys, streams: RwLock::default() }
+        MemoryLog { keys, streams: RwLock::default(), bytes: RwLock::default() }
     }
 
     fn append_now(
@@ -66,6 +68,8 @@ impl MemoryLog {
                 .entry(stream.key)
                 .or_insert_with(|| Stream { head: Head::EMPTY, frames: Vec::new() });
             kept.head = sealed.head;
+            let mut bytes = self.bytes.write().expect("no append panics while it holds the count");
+            *bytes.entry(stream.tenant.clone()).or_default() += sealed.bytes();
             kept.frames.extend(sealed.frames.into_iter().map(Arc::from));
         }
         Ok(Durable::mint(sealed.records, sealed.head))
@@ -134,5 +138,10 @@ impl EventLog for MemoryLog {
             walk.step(frame)?;
         }
         Ok(walk.last())
+    }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        let bytes = self.bytes.read().expect("no append panics while it holds the count");
+        Ok(bytes.get(tenant).copied().unwrap_or(0))
     }
 }

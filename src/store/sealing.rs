@@ -179,6 +179,13 @@ pub struct Sealed {
     pub head: Head,
 }
 
+impl Sealed {
+    /// Bytes of all frames.
+    pub fn bytes(&self) -> u64 {
+        self.frames.iter().map(|frame| frame.len() as u64).sum()
+    }
+}
+
 fn bound_bytes(header: &Header) -> Vec<u8> {
     let mut bytes = header.frame(&[]);
     bytes.truncate(BOUND_BYTES);

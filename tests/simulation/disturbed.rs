@@ -68,6 +68,10 @@ impl EventLog for Disturbed {
         self.inner.walk(stream)
     }
 
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.inner.sealed_bytes(tenant)
+    }
+
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         self.inner.streams(tenant)
     }

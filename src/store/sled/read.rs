@@ -17,7 +17,7 @@ pub(in super::super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u
     key
 }
 
-fn parse_key(bytes: &[u8]) -> Option<(StreamKey, u64, u16)> {
+pub(super) fn parse_key(bytes: &[u8]) -> Option<(StreamKey, u64, u16)> {
     let bytes: &[u8; KEY_BYTES] = bytes.try_into().ok()?;
     let (stream, rest) = bytes.split_first_chunk()?;
     let (seq, chunk) = rest.split_first_chunk()?;
