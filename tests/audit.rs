@@ -11,7 +11,8 @@ use apprentice::learning::{Recipe, train};
 use apprentice::replay::{AuditReport, Difference, Scrutiny, audit, keep_mind, streams_of};
 use apprentice::session::Command;
 use apprentice::store::{
-    AppendError, Draft, EventLog, Pending, ReadError, SeededEntropy, Store, Walk, open, open_memory,
+    AppendError, Draft, EventLog, Pending, ReadError, SealedRecords, SeededEntropy, Store, Walk,
+    open, open_memory,
 };
 use support::diary::Diary;
 use support::toy::Bells;
@@ -291,6 +292,10 @@ impl EventLog for Tampered {
         Ok(Box::new(self.frames.iter().map_while(move |frame| {
             (!failed).then(|| walk.open(&key, frame)).inspect(|record| failed = record.is_err())
         })))
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        self.inner.log.sealed(stream, from)
     }
 
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {

@@ -104,7 +104,6 @@ impl<D: Domain> Life<D> {
     }
 
     /// Who writes the tenants' own streams.
-    #[expect(dead_code, reason = "evidence asks for it")]
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
     }

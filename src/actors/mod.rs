@@ -18,7 +18,7 @@ pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
 pub use meters::{Refusals, Usage};
-pub use registrar::{Erased, Obeyed, Registrar};
+pub use registrar::{Erased, Obeyed, Registrar, Signed};
 pub use response::{
     Ask, Busy, ErrorCode, Failed, Hello, Quota, QuotaExceeded, Rejected, Response, Waited,
 };

@@ -254,6 +254,10 @@ impl<D: Domain> UserActor<D> {
         if reply.told.iter().any(|told| matches!(told, Told::EpisodeEnded { .. })) {
             life::keep_snapshot(&self.life, &self.waking.stream, session);
         }
+        let ends = |told: &Told| matches!(told, Told::EpisodeEnded { .. } | Told::Closed { .. });
+        if reply.told.iter().any(ends) {
+            self.life.registrar().close(&self.waking.stream);
+        }
     }
 
     fn ask_for_training(&mut self, ctx: &mut Context<Self>) {
@@ -321,6 +325,8 @@ impl<D: Domain> Actor for UserActor<D> {
             match woken {
                 Ok(session) => {
                     actor.stage = Stage::Awake(Box::new(session));
+                    // What a crash kept from being closed.
+                    actor.life.registrar().close(&actor.waking.stream);
                     actor.ask_for_training(ctx);
                 }
                 Err(response) => {

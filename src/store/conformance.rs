@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use super::{AppendError, EventLog, Keys, ReadError, Store};
+use super::{AppendError, EventLog, Keys, ReadError, SealedRecord, Store};
 use crate::events::{
-    Batch, Durable, Event, Head, Header, Record, RetrainFailed, SessionClosed, encode,
+    Batch, Durable, Event, Head, Header, Record, RetrainFailed, SessionClosed, commitment, encode,
 };
 use crate::ids::{Digest, RequestId, Seq, StreamId, StreamKey, TenantId, Timestamp, UserId};
 use crate::limits::{BATCH_EVENTS_MAX, RECORD_BYTES_MAX, STORE_VALUE_BYTES_MAX};
@@ -199,6 +199,21 @@ fn a_read_starts_anywhere(subject: Subject) {
         let records: Vec<Record> = records.map(|record| record.expect("it reads")).collect();
         let skipped = usize::try_from(from - 1).expect("a small number").min(all.len());
         assert_eq!(records, all[skipped..], "from {from}");
+        let sealed = log.sealed(&ada, Seq::new(from).expect("from 1 on")).expect("it reads");
+        let sealed: Vec<SealedRecord> = sealed.map(|record| record.expect("it reads")).collect();
+        let key = keys.user_key(&ada).expect("she is here");
+        let opened: Vec<(Seq, Digest)> =
+            sealed.iter().map(|record| (record.header.seq, record.digest)).collect();
+        let wanted: Vec<(Seq, Digest)> =
+            records.iter().map(|record| (record.seq, record.digest)).collect();
+        assert_eq!(opened, wanted, "sealed, from {from}");
+        for (sealed, record) in sealed.iter().zip(&records) {
+            assert_eq!(Digest::of(&sealed.frame), sealed.digest);
+            let body = &sealed.frame[Header::BYTES..];
+            let (salt, body) = key.reveal(&sealed.header, body).expect("it is hers");
+            assert_eq!(body, encode(&record.event));
+            assert_eq!(commitment(&salt, &body), sealed.header.commitment);
+        }
     }
 }
 
@@ -332,6 +347,9 @@ fn an_erased_stream_is_closed(subject: Subject) {
     assert!(matches!(log.read(&ada, Seq::FIRST).map(|_| ()), Err(ReadError::Erased)));
     assert_eq!(log.append(&ada, head, batch(["c"])).wait(), Err(AppendError::Erased));
     assert_eq!(log.head(&ada), Ok(head));
+    let sealed = log.sealed(&ada, Seq::FIRST).expect("that needs no key");
+    let sealed: Vec<Digest> = sealed.map(|record| record.expect("it reads").digest).collect();
+    assert_eq!(sealed, [head.digest]);
     assert_eq!(reasons(&read_all(&**log, &grace)), ["b"]);
 }
 

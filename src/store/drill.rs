@@ -6,7 +6,7 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::log::{EventLog, Pending, ReadError};
+use super::log::{EventLog, Pending, ReadError, SealedRecords};
 use super::{FaultPlan, FaultyLog, Store};
 use crate::events::{Batch, Head, Record};
 use crate::ids::{Seq, StreamId, TenantId};
@@ -89,6 +89,10 @@ impl EventLog for Drill {
         from: Seq,
     ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError> {
         self.faulty.read(stream, from)
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        self.faulty.sealed(stream, from)
     }
 
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {

@@ -2,7 +2,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Deserialize;
 
-use super::log::{AppendError, EventLog, Pending, Promise, ReadError};
+use super::log::{AppendError, EventLog, Pending, Promise, ReadError, SealedRecords};
 use super::{Entropy, SeededEntropy};
 use crate::events::{Batch, Head, Record};
 use crate::ids::{Seq, StreamId, TenantId};
@@ -216,6 +216,11 @@ impl EventLog for FaultyLog {
     ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError> {
         self.alive()?;
         self.inner.read(stream, from)
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        self.alive()?;
+        self.inner.sealed(stream, from)
     }
 
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {

@@ -25,12 +25,12 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use self::commit::{Committer, Job, Syncer};
-use self::read::{Records, frame_at, last_seqs};
+use self::read::{Frames, Records, frame_at, last_seqs};
 use self::sizes::Sizes;
 use self::watch::{InHand, Watch};
 use super::closed::{ClosedMark, Part};
 use super::heads::{Heads, HeadsFile, HeadsRead};
-use super::log::{Pending, ReadError};
+use super::log::{Pending, ReadError, SealedRecords};
 use super::quiet::guarded;
 use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
 use crate::events::{Batch, Head, Header, Record};
@@ -198,6 +198,25 @@ impl SledLog {
         Ok(SledLog { shared, sender, committer, ended, _watch, mark: None, _lock: None })
     }
 
+    /// Where to read from record `from` on: a walk that begins there, and the end; none when there
+    /// is no such record.
+    fn from(
+        &self,
+        stream: &StreamId,
+        from: Seq,
+    ) -> Result<Option<(::sled::Tree, Walk, Head)>, ReadError> {
+        let head = self.shared.head(stream);
+        if from.get() > head.seq {
+            return Ok(None);
+        }
+        let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
+        let last = match super::sealing::before(from) {
+            None => Head::EMPTY,
+            Some(before) => head_at(&tree, stream.key, before)?,
+        };
+        Ok(Some((tree, Walk::after(stream.key, last), head)))
+    }
+
     /// The sentence that poisoned the log, if one did.
     pub fn poisoned(&self) -> Option<&str> {
         self.shared.poisoned.get().map(String::as_str)
@@ -263,18 +282,20 @@ impl EventLog for SledLog {
         stream: &StreamId,
         from: Seq,
     ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError> {
-        let head = self.shared.head(stream);
-        if from.get() > head.seq {
-            return Ok(Box::new(std::iter::empty()));
+        match self.from(stream, from)? {
+            None => Ok(Box::new(std::iter::empty())),
+            Some((tree, walk, head)) => {
+                let key = checks::key_to_read(&self.shared.keys, stream)?;
+                Ok(Box::new(Records::new(&tree, key, walk, head)))
+            }
         }
-        let key = checks::key_to_read(&self.shared.keys, stream)?;
-        let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
-        let last = match super::sealing::before(from) {
-            None => Head::EMPTY,
-            Some(before) => head_at(&tree, stream.key, before)?,
-        };
-        let walk = Walk::after(stream.key, last);
-        Ok(Box::new(Records::new(&tree, key, walk, head)))
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        match self.from(stream, from)? {
+            None => Ok(Box::new(std::iter::empty())),
+            Some((tree, walk, head)) => Ok(Box::new(Frames::new(&tree, walk, head))),
+        }
     }
 
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {

@@ -23,22 +23,22 @@ use apprentice::world::{Domain, Stage};
 use crate::diary::Diary;
 use crate::samples::samples;
 
-/// Whether the bytes were read; a refusal is as good.
-type Read = bool;
+/// Says whether the bytes were read; a refusal is as good.
+pub type Decoder = dyn Fn(&[u8]) -> bool + Send + Sync;
 
 pub struct Target {
     pub name: &'static str,
     /// Its share of the cases: cheap decoders get many.
     pub weight: u64,
     pub corpus: Vec<Vec<u8>>,
-    pub read: Box<dyn Fn(&[u8]) -> Read + Send + Sync>,
+    pub read: Box<Decoder>,
 }
 
 fn target(
     name: &'static str,
     weight: u64,
     corpus: Vec<Vec<u8>>,
-    read: impl Fn(&[u8]) -> Read + Send + Sync + 'static,
+    read: impl Fn(&[u8]) -> bool + Send + Sync + 'static,
 ) -> Target {
     // Examples that are not read would mean that nothing behind the first check is tried.
     for example in &corpus {
@@ -67,7 +67,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// A reader of files, given a file.
-fn from_file(folder: &Path, name: &str, bytes: &[u8], read: impl Fn(&Path) -> Read) -> Read {
+fn from_file(folder: &Path, name: &str, bytes: &[u8], read: impl Fn(&Path) -> bool) -> bool {
     let thread = std::thread::current().id();
     let path = folder.join(format!("{name}-{thread:?}"));
     std::fs::write(&path, bytes).unwrap();

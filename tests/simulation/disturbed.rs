@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use apprentice::events::{Batch, Head, Record};
 use apprentice::ids::{Seq, StreamId, TenantId};
-use apprentice::store::{EventLog, FaultyLog, Pending, ReadError};
+use apprentice::store::{EventLog, FaultyLog, Pending, ReadError, SealedRecords};
 
 const NEVER: usize = usize::MAX;
 
@@ -48,6 +48,11 @@ impl EventLog for Disturbed {
         from: Seq,
     ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError> {
         let records = self.inner.read(stream, from)?;
+        Ok(Box::new(records.map(|record| self.read_one().and(record))))
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        let records = self.inner.sealed(stream, from)?;
         Ok(Box::new(records.map(|record| self.read_one().and(record))))
     }
 
