@@ -11,11 +11,13 @@ use super::rights::{self, Caller};
 use super::wire::{self, Refused};
 use super::zap::{Doorkeeper, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
-use crate::actors::{AnswerTo, ErrorCode, Failed, Failure, Front, NotTaken, Response, Submit};
+use crate::actors::{
+    AnswerTo, Ask, ErrorCode, Failed, Failure, Front, NotTaken, Ordered, Registrar, Response,
+    Submit, TenantAsk, TenantVerb, TenantView,
+};
 use crate::ids::RequestId;
 use crate::limits::GATEWAY_IN_FLIGHT_MAX;
 use crate::sabotage;
-use crate::tenancy::Admissions;
 
 /// The doors: one thread that owns their ROUTERs and polls them together with the outbox of the
 /// actors.
@@ -47,7 +49,6 @@ pub struct Doors<'a> {
 pub struct LockedDoor<'a> {
     pub endpoints: &'a [Endpoint],
     pub key: &'a CurveKey,
-    pub admissions: Admissions,
 }
 
 /// Why the gateway did not open.
@@ -95,6 +96,7 @@ impl Gateway {
         context: &Context,
         doors: Doors<'_>,
         front: Front,
+        registrar: Registrar,
         failure: Failure,
     ) -> Result<Gateway, GatewayError> {
         let start = |reason: String| GatewayError::Start { reason };
@@ -106,9 +108,10 @@ impl Gateway {
         let mut locked = Vec::new();
         let mut routers = vec![door];
         let mut doorkeeper = None;
-        if let Some(LockedDoor { endpoints, key, admissions }) = doors.locked {
+        if let Some(LockedDoor { endpoints, key }) = doors.locked {
             lock::check(zmq::has("curve"))?;
             let (seal, wake) = (Seal::fresh(), outbox.clone());
+            let admissions = registrar.admissions().clone();
             let keeper = Doorkeeper::start(
                 context,
                 seal.clone(),
@@ -126,6 +129,7 @@ impl Gateway {
         let hall = Hall {
             doors: routers,
             front,
+            registrar,
             failure: failure.clone(),
             counters: counters.clone(),
             stopping: stopping.clone(),
@@ -189,6 +193,7 @@ impl Drop for Gateway {
 struct Hall {
     doors: Vec<Door>,
     front: Front,
+    registrar: Registrar,
     failure: Failure,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
@@ -322,14 +327,11 @@ impl Hall {
         if self.in_flight.load(Ordering::SeqCst) >= GATEWAY_IN_FLIGHT_MAX {
             return self.busy(peer, id, "the service has too many requests in hand");
         }
-        self.in_flight.fetch_add(1, Ordering::SeqCst);
-        let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
-        let answer = AnswerTo::new(move |response| {
-            // Encoded here, by the actor's thread: the gateway's only carries.
-            let bytes = wire::encode_response(id, response);
-            outbox.put(Outgoing { peer, bytes });
-            in_flight.fetch_sub(1, Ordering::SeqCst);
-        });
+        let answer = self.answer_to(peer, id);
+        let ask = match ask {
+            Ask::Order(order) => return self.order(&caller, order, answer),
+            ask => ask,
+        };
         let submit = Submit { tenant: caller.tenant(), user, request: id, ask, answer };
         match self.front.submit(submit) {
             Ok(()) => {}
@@ -342,6 +344,40 @@ impl Hall {
                 self.failure.report("the directory of people is gone");
                 let gone = "the service is being restarted";
                 submit.answer.send(Response::error(ErrorCode::Unavailable, gone));
+            }
+        }
+    }
+
+    /// The way back for an answer that is not here yet.
+    fn answer_to(&self, peer: Peer, id: RequestId) -> AnswerTo {
+        self.in_flight.fetch_add(1, Ordering::SeqCst);
+        let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
+        AnswerTo::new(move |response| {
+            // Encoded here, by the actor's thread: the gateway's only carries.
+            let bytes = wire::encode_response(id, response);
+            outbox.put(Outgoing { peer, bytes });
+            in_flight.fetch_sub(1, Ordering::SeqCst);
+        })
+    }
+
+    /// Carries out an order of somebody who may give it.
+    fn order(&self, caller: &Caller, TenantAsk { tenant, verb }: TenantAsk, answer: AnswerTo) {
+        match verb {
+            TenantVerb::List => {
+                let only = if caller.is_host() { tenant } else { Some(caller.tenant()) };
+                let tenants = TenantView::list(self.registrar.admissions(), only.as_ref());
+                answer.send(Response::Tenants(tenants));
+            }
+            TenantVerb::Give(order) => {
+                let tenant = tenant.unwrap_or_else(|| caller.tenant());
+                self.registrar.order(tenant.clone(), order, move |obeyed| {
+                    answer.send(match obeyed {
+                        Ok(events) => {
+                            Response::Ordered(Ordered { tenant, recorded: events.len() as u32 })
+                        }
+                        Err(error) => error.into(),
+                    });
+                });
             }
         }
     }

@@ -10,6 +10,7 @@ mod endpoint;
 mod gateway;
 mod knock;
 mod lock;
+mod orders;
 mod outbox;
 mod rights;
 pub mod wire;
