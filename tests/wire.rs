@@ -11,15 +11,17 @@ use std::fs;
 use std::path::PathBuf;
 
 use apprentice::actors::{
-    Ask, Busy, ErrorCode, Failed, Hello, KeyView, Ordered, Rejected, Response, TenantAsk,
-    TenantVerb, TenantView, Waited,
+    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, KeyView, Ordered, Rejected, Response,
+    TenantAsk, TenantVerb, TenantView, Waited,
 };
-use apprentice::events::{Ending, Report};
+use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::frontends::wire::{
     COMMANDS, ORDERS, QUERIES, Request, decode_request, decode_response, encode_request,
     encode_response,
 };
-use apprentice::ids::{Digest, PublicKey, RequestId, Seq, TenantId, Timestamp, UserId};
+use apprentice::ids::{
+    Digest, PublicKey, RequestId, Seq, Signature, StreamKey, TenantId, Timestamp, UserId,
+};
 use apprentice::language::{
     Answer, Discarded, Evidence, Exemplar, LiftedUtterance, Near, Outcome, Symbol,
 };
@@ -85,6 +87,7 @@ fn requests() -> Vec<(&'static str, Ask)> {
         ("disable", give(Order::Disable { reason: "the study is over".into() })),
         ("enable", give(Order::Enable)),
         ("set_quotas", give(Order::SetQuotas(quotas()))),
+        ("erase", order(Some(lab()), TenantVerb::Erase { user: UserId::new("grace").unwrap() })),
     ]
 }
 
@@ -287,6 +290,18 @@ fn responses() -> Vec<(&'static str, Response)> {
                     valid_until: Some(Timestamp(1_790_604_800_000_000)),
                 }],
             }]),
+        ),
+        (
+            "erased",
+            Response::Erased(ErasedView {
+                tenant: lab(),
+                erased: PersonErased {
+                    stream: StreamKey([7; 16]),
+                    last: seq(41),
+                    head: mind(),
+                    signature: Signature([9; 64]),
+                },
+            }),
         ),
         (
             "denied",

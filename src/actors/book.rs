@@ -2,8 +2,9 @@ use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::life::fresh_request;
-use crate::events::{Batch, Event};
-use crate::ids::{Seq, StreamId, TenantId, Timestamp};
+use crate::events::{Batch, Event, Head, PersonErased};
+use crate::evidence;
+use crate::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::store::{AppendError, KeyError, ReadError, Store};
 use crate::tenancy::{self, Admissions, Disagreement, Order, Refusal, Registry};
 
@@ -31,6 +32,10 @@ pub enum OrderError {
     Read { tenant: TenantId, error: ReadError },
     #[error("tenant {tenant}: {error}; was it recorded by another version of apprentice?")]
     Disagreement { tenant: TenantId, error: Disagreement },
+    #[error("tenant {tenant} has no records of such a person: nothing was erased")]
+    NobodyThere { tenant: TenantId },
+    #[error("they are still busy; nothing was erased; ask again in a moment")]
+    StillBusy,
     /// The service is ending.
     #[error("the registrar is gone; ask again when the service is back")]
     Gone,
@@ -51,11 +56,17 @@ impl Book {
             book.admissions.update(&tenant, registry.standing());
             book.registries.insert(tenant, registry);
         }
+        book.finish_erasures()?;
         Ok(book)
     }
 
     pub fn admissions(&self) -> &Admissions {
         &self.admissions
+    }
+
+    /// The stream of a person.
+    pub fn stream_id(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
+        self.store.keys.stream_id(tenant, user)
     }
 
     /// A tenant's stream, folded; the default for one without records.
@@ -120,6 +131,66 @@ impl Book {
         }
         self.admissions.update(tenant, registry.standing());
         Ok(events)
+    }
+}
+
+impl Book {
+    /// Erases a person: destroys their key, drops their minds and snapshots, and says so in the
+    /// tenant's stream, signed. Blocks. Repeating it is harmless.
+    ///
+    /// The caller has seen to it that nobody speaks for the person meanwhile.
+    ///
+    /// - errors: the person never was, or what could not be destroyed or recorded; when only the
+    ///   recording is missing, the next start makes up for it.
+    pub fn erase(&mut self, stream: &StreamId) -> Result<PersonErased, OrderError> {
+        let tenant = stream.tenant.clone();
+        let read = |error| OrderError::Read { tenant: tenant.clone(), error };
+        if self.store.log.walk(stream).map_err(read)? == Head::EMPTY {
+            return Err(OrderError::NobodyThere { tenant });
+        }
+        self.store
+            .erase(stream)
+            .map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
+        self.note_erasure(stream)
+    }
+
+    fn note_erasure(&mut self, stream: &StreamId) -> Result<PersonErased, OrderError> {
+        let tenant = &stream.tenant;
+        if let Some(noted) = self.registries.get(tenant).and_then(|it| it.erased().get(&stream.key))
+        {
+            return Ok(noted.clone());
+        }
+        let read = |error| OrderError::Read { tenant: tenant.clone(), error };
+        let Head { seq, digest: head } = self.store.log.walk(stream).map_err(read)?;
+        let Some(last) = Seq::new(seq) else {
+            return Err(OrderError::NobodyThere { tenant: tenant.clone() });
+        };
+        let secret = self.store.keys.signing_secret(tenant);
+        let secret = secret.map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
+        let statement = tenancy::erasure_statement(tenant, stream.key, last, head);
+        let signature = evidence::sign(&secret, &statement);
+        let order = Order::NoteErasure { stream: stream.key, last, head, signature };
+        self.obey(tenant, &order)?;
+        tracing::info!(%stream, records = seq, "a person was erased");
+        Ok(PersonErased { stream: stream.key, last, head, signature })
+    }
+
+    /// Records the erasures that a crash cut short after the key was gone.
+    fn finish_erasures(&mut self) -> Result<(), OrderError> {
+        let tenants: Vec<TenantId> = self.registries.keys().cloned().collect();
+        for tenant in tenants {
+            let erased = self.store.keys.erased(&tenant);
+            let erased =
+                erased.map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
+            for stream in erased {
+                match self.note_erasure(&stream) {
+                    // A key that never sealed anything.
+                    Ok(_) | Err(OrderError::NobodyThere { .. }) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        Ok(())
     }
 }
 

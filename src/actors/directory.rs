@@ -1,15 +1,17 @@
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use actix::dev::SendError;
 use actix::{Actor, Context, Handler, Message, Recipient};
 
+use super::Registrar;
 use super::awake::{Awake, AwakeCount};
 use super::response::{Ask, ErrorCode, Hello, Response};
 use super::submit::{Presence, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::limits::DIRECTORY_QUEUE_MAX;
 use crate::sabotage;
+use crate::store::KeyError;
 
 /// Knows who is awake, wakes whoever is asked for, and is the only one who puts people to sleep:
 /// an actor that stopped by itself while others hold its address would lose their messages.
@@ -19,6 +21,9 @@ pub(super) struct Directory {
     pub awake_max: usize,
     pub hello: Hello,
     pub count: Arc<AwakeCount>,
+    pub registrar: Registrar,
+    /// People who are being erased: nobody wakes them.
+    pub leaving: BTreeSet<StreamId>,
     entries: HashMap<StreamId, Entry>,
     /// From the tick of the last request to whose it was: the longest idle first.
     order: BTreeMap<u64, StreamId>,
@@ -27,8 +32,8 @@ pub(super) struct Directory {
 
 /// Where people's actors come from; hides the domain from the directory and from the front ends.
 pub(super) trait People: Send + Unpin + 'static {
-    /// - errors: a sentence, when the tenant's key cannot be read or made.
-    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String>;
+    /// - errors: when the tenant's key cannot be read.
+    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError>;
     fn wake(&self, waking: Waking) -> Address;
 }
 
@@ -87,12 +92,15 @@ impl Directory {
         awake_max: usize,
         hello: Hello,
         count: Arc<AwakeCount>,
+        registrar: Registrar,
     ) -> Directory {
         Directory {
             people,
             awake_max,
             hello,
             count,
+            registrar,
+            leaving: BTreeSet::new(),
             entries: HashMap::new(),
             order: BTreeMap::new(),
             ticks: 0,
@@ -100,6 +108,11 @@ impl Directory {
     }
 
     fn forward(&mut self, stream: StreamId, mut submit: Submit, ctx: &mut Context<Self>) {
+        if self.leaving.contains(&stream) {
+            let leaving = "this person is being erased; send it again in a moment";
+            submit.answer.send(Response::busy(leaving, RETRY_CROWD_MS));
+            return;
+        }
         // Twice at most: an address that turns out to be closed is replaced by a fresh one.
         for _ in 0..2 {
             if !self.entries.contains_key(&stream) && !self.wake(&stream, &submit.user, ctx) {
@@ -161,11 +174,16 @@ impl Directory {
     }
 
     /// Removes the entry first and then tells the actor to stop, so that no message can follow.
-    fn strike_off(&mut self, stream: &StreamId) {
+    pub fn strike_off(&mut self, stream: &StreamId) {
         if let Some(entry) = self.entries.remove(stream) {
             self.order.remove(&entry.tick);
             entry.address.sleep.do_send(Sleep);
         }
+    }
+
+    /// What the person's actor has to do; none when they sleep.
+    pub fn presence_of(&self, stream: &StreamId) -> Option<Presence> {
+        self.entries.get(stream).map(|entry| entry.presence.clone())
     }
 
     fn touch(&mut self, stream: &StreamId) {
@@ -196,7 +214,12 @@ impl Handler<Submit> for Directory {
         sabotage::point("directory");
         match self.people.stream_of(&submit.tenant, &submit.user) {
             Ok(stream) => self.forward(stream, submit, ctx),
-            Err(reason) => submit.answer.send(Response::error(ErrorCode::Unavailable, reason)),
+            Err(error) => {
+                // Where the key stands is the operator's business.
+                tracing::error!(tenant = %submit.tenant, %error, "a tenant's key cannot be used");
+                let sentence = "this lab's key cannot be used now; an operator must look";
+                submit.answer.send(Response::error(ErrorCode::Unavailable, sentence));
+            }
         }
     }
 }

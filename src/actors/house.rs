@@ -7,14 +7,15 @@ use actix::{Actor, Addr, Arbiter, ArbiterHandle, Recipient, SyncArbiter, System}
 
 use super::awake::AwakeCount;
 use super::directory::{Address, Directory, People, SleepAll, Waking};
+use super::farewell::Farewell;
 use super::life::{Life, Parts};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{Book, Failure, Hello, OrderError, Registrar, Submit};
+use super::{Book, Erased, Failure, Hello, OrderError, Registrar, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
-use crate::store::{CacheCounter, CacheCounts, Store};
+use crate::store::{CacheCounter, CacheCounts, KeyError, Store};
 use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
@@ -69,7 +70,10 @@ pub enum ActorsError {
 
 /// Where front ends hand in requests. Knows no domain.
 #[derive(Clone)]
-pub struct Front(Recipient<Submit>);
+pub struct Front {
+    submit: Recipient<Submit>,
+    farewell: Recipient<Farewell>,
+}
 
 /// A request that was not taken, given back.
 pub enum NotTaken {
@@ -80,8 +84,18 @@ pub enum NotTaken {
 }
 
 impl Front {
+    /// As [`House::erase`]; when everybody is gone, `answer` is dropped.
+    pub fn erase(
+        &self,
+        tenant: TenantId,
+        user: UserId,
+        answer: impl FnOnce(Erased) + Send + 'static,
+    ) {
+        self.farewell.do_send(Farewell { tenant, user, answer: Box::new(answer) });
+    }
+
     pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
-        self.0.try_send(submit).map_err(|error| match error {
+        self.submit.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
             SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
         })
@@ -139,7 +153,10 @@ impl House {
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
                     let homes = arbiters.iter().map(Arbiter::handle).collect();
                     let people = Box::new(Homes { life, homes });
-                    (Directory::new(people, awake_max, hello, count).start(), registrar)
+                    let for_directory = registrar.clone();
+                    let directory =
+                        Directory::new(people, awake_max, hello, count, for_directory).start();
+                    (directory, registrar)
                 });
                 let _ = started.send((directory, registrar, System::current()));
                 if let Err(error) = system.run() {
@@ -166,12 +183,26 @@ impl House {
     }
 
     pub fn front(&self) -> Front {
-        Front(self.directory.clone().recipient())
+        let directory = self.directory.clone();
+        Front { submit: directory.clone().recipient(), farewell: directory.recipient() }
     }
 
     /// Where orders about tenants are handed in.
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
+    }
+
+    /// Erases a person: destroys their key, so that nothing they said can be read any more, and
+    /// records that it was done. `answer` is called once, from another thread. Nobody is awake in
+    /// their name meanwhile; whoever uses the name afterwards is somebody new.
+    pub fn erase(
+        &self,
+        tenant: TenantId,
+        user: UserId,
+        answer: impl FnOnce(Erased) + Send + 'static,
+    ) {
+        let answer = Box::new(answer);
+        self.directory.do_send(Farewell { tenant, user, answer });
     }
 
     /// People awake now.
@@ -229,7 +260,7 @@ struct Homes<D: Domain> {
 }
 
 impl<D: Domain> People for Homes<D> {
-    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String> {
+    fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
         self.life.stream_of(tenant, user)
     }
 

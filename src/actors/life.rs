@@ -18,7 +18,7 @@ use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
 use crate::sabotage;
 use crate::session::{Command, Proposed, Session};
-use crate::store::{AppendError, EventLog, Store};
+use crate::store::{AppendError, EventLog, KeyError, Store};
 use crate::world::Domain;
 
 /// What the actors are made from, before there is an actix system.
@@ -110,8 +110,8 @@ impl<D: Domain> Life<D> {
         &self.failure
     }
 
-    pub fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, String> {
-        self.store.keys.stream_id(tenant, user).map_err(|error| error.to_string())
+    pub fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
+        self.store.keys.stream_id(tenant, user)
     }
 
     /// The wall clock; a session makes it monotone with `next_at`.

@@ -1,7 +1,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{ErrorCode, OrderError, Response};
-use crate::ids::{PublicKey, TenantId, Timestamp};
+use crate::events::PersonErased;
+use crate::ids::{PublicKey, TenantId, Timestamp, UserId};
 use crate::store::AppendError;
 use crate::tenancy::{Admissions, Order, Quotas, Role, Standing};
 
@@ -18,6 +19,18 @@ pub struct TenantAsk {
 pub enum TenantVerb {
     List,
     Give(Order),
+    /// Destroy a person's key.
+    Erase {
+        user: UserId,
+    },
+}
+
+/// A person is erased.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ErasedView {
+    pub tenant: TenantId,
+    /// As it stands in the tenant's stream.
+    pub erased: PersonErased,
 }
 
 /// An order was carried out, and is durable.
@@ -89,12 +102,13 @@ impl From<OrderError> for Response {
         match error {
             OrderError::Busy
             | OrderError::Gone
+            | OrderError::StillBusy
             | OrderError::Append { error: AppendError::Busy { .. }, .. } => {
                 Response::busy(message, RETRY_BUSY_MS)
             }
-            OrderError::Refused { .. } | OrderError::KeyOfOther => {
-                Response::error(ErrorCode::Refused, message)
-            }
+            OrderError::Refused { .. }
+            | OrderError::KeyOfOther
+            | OrderError::NobodyThere { .. } => Response::error(ErrorCode::Refused, message),
             OrderError::Append { .. }
             | OrderError::Key { .. }
             | OrderError::Read { .. }

@@ -5,8 +5,8 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::awake::Awake;
 use super::{Book, Failure, OrderError};
-use crate::events::Event;
-use crate::ids::TenantId;
+use crate::events::{Event, PersonErased};
+use crate::ids::{StreamId, TenantId};
 use crate::limits::REGISTRAR_QUEUE_MAX;
 use crate::store::AppendError;
 use crate::tenancy::{Admissions, Order};
@@ -39,8 +39,19 @@ struct Desk {
 struct Obey {
     tenant: TenantId,
     order: Order,
-    answer: Box<dyn FnOnce(Obeyed) + Send>,
+    answer: Way<Vec<Event>>,
     /// The queue of a `SyncArbiter` is not bounded by itself.
+    _place: OwnedSemaphorePermit,
+}
+
+/// What came of an erasure.
+pub type Erased = Result<PersonErased, OrderError>;
+
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Erase {
+    stream: StreamId,
+    answer: Way<PersonErased>,
     _place: OwnedSemaphorePermit,
 }
 
@@ -61,13 +72,23 @@ impl Registrar {
         order: Order,
         answer: impl FnOnce(Obeyed) + Send + 'static,
     ) {
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
-            return answer(Err(OrderError::Busy));
-        };
         let answer = Answer(Some(Box::new(answer)));
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer.send(Err(OrderError::Busy));
+        };
         let answer = Box::new(move |obeyed| answer.send(obeyed));
         // A queue that is closed drops the order, and a dropped answer says so.
         self.address.do_send(Obey { tenant, order, answer, _place: place });
+    }
+
+    /// Erases a person for whom nobody speaks any more; `answer` as in [`Registrar::order`].
+    pub(super) fn erase(&self, stream: StreamId, answer: impl FnOnce(Erased) + Send + 'static) {
+        let answer = Answer(Some(Box::new(answer)));
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer.send(Err(OrderError::Busy));
+        };
+        let answer = Box::new(move |erased| answer.send(erased));
+        self.address.do_send(Erase { stream, answer, _place: place });
     }
 
     pub fn admissions(&self) -> &Admissions {
@@ -76,17 +97,19 @@ impl Registrar {
 }
 
 /// An answer that is never forgotten: dropped unused, it says that nobody carries orders out.
-struct Answer(Option<Box<dyn FnOnce(Obeyed) + Send>>);
+struct Answer<T>(Option<Way<T>>);
 
-impl Answer {
-    fn send(mut self, obeyed: Obeyed) {
+type Way<T> = Box<dyn FnOnce(Result<T, OrderError>) + Send>;
+
+impl<T> Answer<T> {
+    fn send(mut self, outcome: Result<T, OrderError>) {
         if let Some(answer) = self.0.take() {
-            answer(obeyed);
+            answer(outcome);
         }
     }
 }
 
-impl Drop for Answer {
+impl<T> Drop for Answer<T> {
     fn drop(&mut self) {
         if let Some(answer) = self.0.take() {
             answer(Err(OrderError::Gone));
@@ -106,11 +129,31 @@ impl Handler<Obey> for Clerk {
         let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
         let obeyed = desk.book.obey(&tenant, &order);
         drop(desk);
-        if let Err(OrderError::Append { error, .. }) = &obeyed
+        self.look_at(obeyed.as_ref().err());
+        answer(obeyed);
+    }
+}
+
+impl Handler<Erase> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, erase: Erase, _: &mut SyncContext<Self>) {
+        let Erase { stream, answer, _place } = erase;
+        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
+        let erased = desk.book.erase(&stream);
+        drop(desk);
+        self.look_at(erased.as_ref().err());
+        answer(erased);
+    }
+}
+
+impl Clerk {
+    /// A log that is poisoned ends the service.
+    fn look_at(&self, error: Option<&OrderError>) {
+        if let Some(OrderError::Append { error, .. }) = error
             && matches!(error, AppendError::Poisoned { .. } | AppendError::Gone)
         {
             self.failure.report(error.to_string());
         }
-        answer(obeyed);
     }
 }

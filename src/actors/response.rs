@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::operator::{Ordered, TenantAsk, TenantView};
+use super::operator::{ErasedView, Ordered, TenantAsk, TenantView};
 use crate::session::{
     Command, KnownExemplar, Query, Rejection, RejectionCode, Reply, Status, Told,
 };
@@ -33,6 +33,7 @@ pub enum Response {
     Hello(Hello),
     Ordered(Ordered),
     Tenants(Vec<TenantView>),
+    Erased(ErasedView),
     /// Declined; nothing was recorded.
     Rejected(Rejected),
     /// Not now. The same request id may be sent again.

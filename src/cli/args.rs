@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::failure::Failure;
 use super::logging::Logging;
 use super::{
-    audit, check_copy, converse, eval, export, import, keys, log, replay, salvage, self_test,
-    serve, talk, tenant, transcript, verify,
+    audit, check_copy, converse, erase, eval, export, import, keys, log, replay, salvage,
+    self_test, serve, talk, tenant, transcript, verify,
 };
 use crate::store;
 
@@ -61,6 +61,7 @@ enum Verb {
     Salvage(salvage::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
+    Erase(erase::Arguments),
     Verify(verify::Arguments),
     #[command(hide = true)]
     CheckCopy(check_copy::Arguments),
@@ -103,6 +104,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Salvage(arguments)) => salvage::run(arguments),
         Some(Verb::Export(arguments)) => export::run(arguments),
         Some(Verb::Import(arguments)) => import::run(arguments),
+        Some(Verb::Erase(arguments)) => erase::run(arguments),
         Some(Verb::Verify(arguments)) => verify::run(arguments),
         Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }

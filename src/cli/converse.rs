@@ -6,9 +6,7 @@ use super::embedded::{self, Wanted};
 use super::failure::Failure;
 use super::{data_dir, recipe, terminal};
 use crate::service::Data;
-
-/// The file in the data directory that remembers what was typed.
-const HISTORY_FILE: &str = "history.txt";
+use crate::store::HISTORY_FILE;
 
 /// A service of one's own and a conversation with it.
 #[derive(Debug, Args)]

@@ -1,5 +1,5 @@
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::failure::Failure;
 
@@ -19,6 +19,17 @@ pub fn choose(flag: Option<PathBuf>) -> Result<PathBuf, Failure> {
                 "there is no home directory to keep data in; name one with --data DIR",
             )
         }),
+    }
+}
+
+/// For commands that change what is there and must not make a directory by a slip of the pen.
+pub fn must_hold_data(directory: &Path) -> Result<(), Failure> {
+    match directory.join("LAYOUT").exists() {
+        true => Ok(()),
+        false => Err(Failure::bad_input(format!(
+            "there is no data directory of apprentice at {}; name the one that people's data is in",
+            directory.display()
+        ))),
     }
 }
 

@@ -14,6 +14,7 @@ mod draws;
 mod note;
 mod proof;
 mod segment;
+mod statement;
 mod tree;
 mod verify;
 
@@ -21,5 +22,6 @@ pub use checkpoint::{Checkpoint, CheckpointError};
 pub use note::{KeyNameError, NoteError, NoteSigner, VerifierKey};
 pub use proof::{Consistency, Inclusion, Proof, ProofError, Revealed};
 pub use segment::Segment;
+pub use statement::{is_signed, sign};
 pub use tree::{Frontier, Tree, TreeHash, is_consistent, root_by_path};
 pub use verify::{Verified, VerifiedRecord, VerifyError, verify};

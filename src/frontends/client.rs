@@ -4,7 +4,9 @@ use std::time::{Duration, Instant};
 use super::knock::{Knock, knock};
 use super::wire::{self, Request};
 use super::{Context, CurveKey, Endpoint, EndpointError, z85};
-use crate::actors::{Ask, Hello, Ordered, Response, TenantAsk, TenantVerb, TenantView, Waited};
+use crate::actors::{
+    Ask, ErasedView, Hello, Ordered, Response, TenantAsk, TenantVerb, TenantView, Waited,
+};
 use crate::ids::{PublicKey, RequestId, Seq, TenantId, UserId};
 use crate::limits::{CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, WAIT_S_MAX};
 use crate::session::{Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status};
@@ -245,6 +247,15 @@ impl Client {
         }
     }
 
+    /// Erases a person, for good. Under a fresh request id: after an answer was lost, look whether
+    /// the name is in use again before asking anew, or its new bearer would be erased.
+    pub fn erase(&self, tenant: Option<TenantId>, user: UserId) -> Result<ErasedView, ClientError> {
+        match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::Erase { user } }))? {
+            Response::Erased(erased) => Ok(erased),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
     /// Waits until the training that runs is over, if one does.
     ///
     /// - errors: [`ClientError::NoAnswer`] when it is not over within `limit`.
@@ -442,6 +453,7 @@ impl Client {
             Response::Hello(_) => "a hello",
             Response::Ordered(_) => "the end of an order",
             Response::Tenants(_) => "tenants",
+            Response::Erased(_) => "an erasure",
             Response::Rejected(_) | Response::Busy(_) | Response::Error(_) => "a refusal",
         };
         ClientError::Puzzling { endpoint: self.endpoint.clone(), reason: kind.to_owned() }

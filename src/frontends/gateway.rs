@@ -6,16 +6,17 @@ use std::time::{Duration, Instant};
 
 use super::counters::{Counters, count};
 use super::door::{Door, Incoming, Keyed, Sender};
+use super::erasures::{Asked, Erasures};
 use super::outbox::{Inbox, Outbox};
 use super::rights::{self, Caller};
 use super::wire::{self, Refused};
 use super::zap::{Doorkeeper, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
 use crate::actors::{
-    AnswerTo, Ask, ErrorCode, Failed, Failure, Front, NotTaken, Ordered, Registrar, Response,
-    Submit, TenantAsk, TenantVerb, TenantView,
+    AnswerTo, Ask, ErasedView, ErrorCode, Failed, Failure, Front, NotTaken, Ordered, Registrar,
+    Response, Submit, TenantAsk, TenantVerb, TenantView,
 };
-use crate::ids::RequestId;
+use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::GATEWAY_IN_FLIGHT_MAX;
 use crate::sabotage;
 
@@ -130,6 +131,7 @@ impl Gateway {
             doors: routers,
             front,
             registrar,
+            erasures: Erasures::default(),
             failure: failure.clone(),
             counters: counters.clone(),
             stopping: stopping.clone(),
@@ -194,6 +196,7 @@ struct Hall {
     doors: Vec<Door>,
     front: Front,
     registrar: Registrar,
+    erasures: Erasures,
     failure: Failure,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
@@ -329,7 +332,7 @@ impl Hall {
         }
         let answer = self.answer_to(peer, id);
         let ask = match ask {
-            Ask::Order(order) => return self.order(&caller, order, answer),
+            Ask::Order(order) => return self.order(&caller, order, id, answer),
             ask => ask,
         };
         let submit = Submit { tenant: caller.tenant(), user, request: id, ask, answer };
@@ -361,12 +364,21 @@ impl Hall {
     }
 
     /// Carries out an order of somebody who may give it.
-    fn order(&self, caller: &Caller, TenantAsk { tenant, verb }: TenantAsk, answer: AnswerTo) {
+    fn order(
+        &self,
+        caller: &Caller,
+        TenantAsk { tenant, verb }: TenantAsk,
+        id: RequestId,
+        answer: AnswerTo,
+    ) {
         match verb {
             TenantVerb::List => {
                 let only = if caller.is_host() { tenant } else { Some(caller.tenant()) };
                 let tenants = TenantView::list(self.registrar.admissions(), only.as_ref());
                 answer.send(Response::Tenants(tenants));
+            }
+            TenantVerb::Erase { user } => {
+                self.erase(tenant.unwrap_or_else(|| caller.tenant()), user, id, answer);
             }
             TenantVerb::Give(order) => {
                 let tenant = tenant.unwrap_or_else(|| caller.tenant());
@@ -380,6 +392,29 @@ impl Hall {
                 });
             }
         }
+    }
+
+    fn erase(&self, tenant: TenantId, user: UserId, id: RequestId, answer: AnswerTo) {
+        match self.erasures.ask(&tenant, id) {
+            Asked::First => {}
+            Asked::UnderWay => {
+                let under_way = "this person is being erased; ask again in a moment";
+                return answer.send(Response::busy(under_way, RETRY_FULL_MS));
+            }
+            Asked::Done(view) => return answer.send(Response::Erased(view)),
+        }
+        let erasures = self.erasures.clone();
+        self.front.erase(tenant.clone(), user, move |erased| {
+            let (view, response) = match erased {
+                Ok(erased) => {
+                    let view = ErasedView { tenant: tenant.clone(), erased };
+                    (Some(view.clone()), Response::Erased(view))
+                }
+                Err(error) => (None, error.into()),
+            };
+            erasures.end(&tenant, id, view);
+            answer.send(response);
+        });
     }
 
     fn deny(&self, peer: Peer, id: RequestId, failed: Failed) {

@@ -7,6 +7,7 @@ mod counters;
 mod curve_keys;
 mod door;
 mod endpoint;
+mod erasures;
 mod gateway;
 mod knock;
 mod lock;

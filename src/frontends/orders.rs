@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::actors::TenantVerb;
-use crate::ids::PublicKey;
+use crate::ids::{PublicKey, UserId};
 use crate::tenancy::{Order, Quotas, Role};
 
 /// The orders that operators may give, as they are spelled on the wire.
-pub const ORDERS: [&str; 8] =
-    ["list", "add", "admit", "retire", "rotate", "disable", "enable", "set_quotas"];
+pub const ORDERS: [&str; 9] =
+    ["list", "add", "admit", "retire", "rotate", "disable", "enable", "set_quotas", "erase"];
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -37,6 +37,9 @@ pub(super) enum WireOrder {
     },
     Enable,
     SetQuotas(Quotas),
+    Erase {
+        user: UserId,
+    },
 }
 
 impl WireOrder {
@@ -44,6 +47,7 @@ impl WireOrder {
     pub fn of(verb: &TenantVerb) -> Option<WireOrder> {
         let order = match verb {
             TenantVerb::List => return Some(WireOrder::List),
+            TenantVerb::Erase { user } => return Some(WireOrder::Erase { user: user.clone() }),
             TenantVerb::Give(order) => order.clone(),
         };
         match order {
@@ -65,6 +69,7 @@ impl WireOrder {
     pub fn verb(self) -> TenantVerb {
         TenantVerb::Give(match self {
             WireOrder::List => return TenantVerb::List,
+            WireOrder::Erase { user } => return TenantVerb::Erase { user },
             WireOrder::Add => Order::Open,
             WireOrder::Admit { key, role, label } => Order::Admit { key, role, label },
             WireOrder::Retire { key, overlap_seconds } => Order::Retire { key, overlap_seconds },

@@ -39,7 +39,7 @@ impl Caller {
     }
 
     /// The operators of the whole host are those of tenant `local`; another tenant's decide about
-    /// its keys and see its quotas. They do not set them: quotas protect the others from it.
+    /// its keys, erase its people and see its quotas. They do not set them: quotas protect the others from it.
     pub fn is_host(&self) -> bool {
         self.tenant() == TenantId::local()
     }
@@ -54,6 +54,7 @@ impl Caller {
         }
         match verb {
             TenantVerb::List
+            | TenantVerb::Erase { .. }
             | TenantVerb::Give(Order::Admit { .. } | Order::Retire { .. } | Order::Rotate { .. }) => {
                 Ok(())
             }
@@ -94,7 +95,7 @@ fn roles_for(ask: &Ask) -> &'static [Role] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ids::PublicKey;
+    use crate::ids::{PublicKey, UserId};
     use crate::session::{Command, Query};
     use crate::tenancy::Quotas;
 
@@ -129,6 +130,7 @@ mod tests {
         let key = PublicKey([1; 32]);
         let own = [
             TenantVerb::List,
+            TenantVerb::Erase { user: UserId::new("ada").unwrap() },
             TenantVerb::Give(Order::Admit { key, role: Role::Auditor, label: String::new() }),
             TenantVerb::Give(Order::Retire { key, overlap_seconds: 0 }),
             TenantVerb::Give(Order::Rotate { old: key, new: key, overlap_seconds: 0 }),

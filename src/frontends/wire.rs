@@ -8,7 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::orders::WireOrder;
 use crate::actors::{
-    Ask, Busy, ErrorCode, Failed, Hello, Ordered, Rejected, Response, TenantAsk, TenantView, Waited,
+    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, Ordered, Rejected, Response, TenantAsk,
+    TenantView, Waited,
 };
 use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
@@ -269,6 +270,8 @@ struct ResponseMap {
     #[serde(skip_serializing_if = "Option::is_none")]
     tenants: Option<Vec<TenantView>>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    erased: Option<ErasedView>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     rejected: Option<Rejected>,
     #[serde(skip_serializing_if = "Option::is_none")]
     busy: Option<Busy>,
@@ -290,6 +293,7 @@ pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
         Response::Hello(hello) => map.hello = Some(hello),
         Response::Ordered(ordered) => map.ordered = Some(ordered),
         Response::Tenants(tenants) => map.tenants = Some(tenants),
+        Response::Erased(erased) => map.erased = Some(erased),
         Response::Rejected(rejected) => map.rejected = Some(rejected),
         Response::Busy(busy) => map.busy = Some(busy),
         Response::Error(failed) => map.error = Some(failed),
@@ -315,6 +319,7 @@ pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
         map.hello.map(Response::Hello),
         map.ordered.map(Response::Ordered),
         map.tenants.map(Response::Tenants),
+        map.erased.map(Response::Erased),
         map.rejected.map(Response::Rejected),
         map.busy.map(Response::Busy),
         map.error.map(Response::Error),

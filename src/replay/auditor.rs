@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::audit::{Counts, Progress, Scrutiny, StreamReport};
 use super::origins::mind_origin;
-use super::{Difference, repropose};
-use crate::events::{Event, Record, Report, RetrainCompleted};
+use super::{Difference, erasures, repropose};
+use crate::events::{Event, Record, Report, RetrainCompleted, TenantEvent};
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
@@ -140,6 +140,12 @@ impl<'a, D: Domain> Auditor<'a, D> {
             registry.apply(&record).map_err(|error| {
                 Difference::new(error.seq.get(), "place in history", "what is there", error.reason)
             })?;
+            if let Event::Tenant(TenantEvent::PersonErased(erased)) = &record.event {
+                let tenant = &self.stream.tenant;
+                erasures::check(self.store, tenant, record.seq.get(), erased)
+                    .into_iter()
+                    .for_each(|difference| self.note(difference));
+            }
         }
         Ok(())
     }

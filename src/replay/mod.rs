@@ -5,6 +5,7 @@
 mod audit;
 mod auditor;
 mod difference;
+mod erasures;
 mod minds;
 mod origins;
 mod rebuild;

@@ -2,16 +2,18 @@
 //! and so does any program that wants the service inside itself (`examples/embed.rs`).
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use crate::actors::{ActorsError, Failure, House, HouseSettings, Registrar, Wakings};
+use crate::actors::{
+    ActorsError, Erased, Failure, House, HouseSettings, OrderError, Registrar, Wakings,
+};
 use crate::frontends::{
     Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
     Gateway, GatewayError, LockedDoor,
 };
-use crate::ids::{PublicKey, UserId};
+use crate::ids::{PublicKey, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::limits::AWAKE_USERS_MAX;
 use crate::store::{self, FaultPlan};
@@ -178,6 +180,19 @@ impl Service {
     /// The service's own public key, when it has a door with keys.
     pub fn server_key(&self) -> Option<&PublicKey> {
         self.server_key.as_ref()
+    }
+
+    /// Erases a person while the service runs: their key is destroyed, their minds and snapshots go,
+    /// and the tenant's stream says so, signed. Blocks.
+    ///
+    /// - errors: nobody of that name, or what stood in the way.
+    pub fn erase(&self, tenant: TenantId, user: UserId) -> Erased {
+        let (sender, receiver) = mpsc::channel();
+        self.house.erase(tenant, user, move |erased| {
+            // Nobody waits any more when the service was dropped meanwhile.
+            let _ = sender.send(erased);
+        });
+        receiver.recv().unwrap_or(Err(OrderError::Gone))
     }
 
     /// What came through the doors.

@@ -40,7 +40,7 @@ impl Store {
         let every = Duration::from_millis(plan.release_every_ms);
         let faulty = Arc::new(FaultyLog::new(self.log.clone(), plan));
         let drill = Drill::start(faulty, every)?;
-        Ok(Store { log: Arc::new(drill), ..self })
+        Ok(self.with_log(Arc::new(drill)))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::ids::{StreamId, StreamKey, TenantId, UserId};
 const CACHED_KEYS_MAX: usize = 16_384;
 const KEY_FILE_HEAD: &str = "apprentice user key 1\n";
 const WRAPPING: &str = "apprentice 1: wrapping of user keys";
+const SIGNING: &str = "apprentice 1: signing";
 const STREAM_KEYS: &str = "apprentice 1: stream keys";
 
 /// Why a key cannot be had.
@@ -32,6 +33,11 @@ pub enum KeyError {
     Missing { stream: StreamId, path: String },
     #[error("the person behind stream {stream} was erased")]
     Erased { stream: StreamId },
+    #[error(
+        "tenant {tenant} has one secret in the environment variable {variable} and another in the \
+         file {path}; keep the one that its records were sealed with"
+    )]
+    TwoSecrets { tenant: TenantId, variable: String, path: String },
     #[error("the keys are open for reading only")]
     ReadOnly,
     #[error("the key file {path} cannot be used: {reason}")]
@@ -43,7 +49,9 @@ pub enum KeyError {
 /// They live *outside* the log's database, whose old pages would keep a destroyed key, as one small
 /// file each:
 ///
-/// - `<tenant>.key`: 64 hexadecimal digits, mode 0600;
+/// - `<tenant>.key`: 64 hexadecimal digits, mode 0600; instead of the file, the environment variable
+///   `APPRENTICE_TENANT_KEY_<TENANT>` may hold them (capital letters, `_` for `-`), so that a copy of
+///   the directory opens nothing;
 /// - `users/<tenant>/<stream key>.key`: the wrapped data key;
 /// - `users/<tenant>/<stream key>.erased`: empty; says that the key is gone on purpose.
 pub struct Keys {
@@ -212,13 +220,73 @@ impl Keys {
     }
 
     /// The stream of a person: a keyed hash of the name, so that nobody without the tenant's
-    /// secret can tell from the log who is in it, not even by guessing names.
+    /// secret can tell from the log who is in it, not even by guessing names. A name whose person was
+    /// erased stands for somebody new: the next life of that name.
     pub fn stream_id(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
-        let secret = self.tenant_key(&mut self.held(), tenant)?;
+        let mut held = self.held();
+        let mut life = 0;
+        loop {
+            let stream = self.stream_of_life(&mut held, tenant, user, life)?;
+            if !self.is_erased(&held, &stream) {
+                return Ok(stream);
+            }
+            life += 1;
+        }
+    }
+
+    /// - `life`: how many bearers of this name were erased before.
+    fn stream_of_life(
+        &self,
+        held: &mut Held,
+        tenant: &TenantId,
+        user: &UserId,
+        life: u64,
+    ) -> Result<StreamId, KeyError> {
+        let secret = self.tenant_key(held, tenant)?;
         let key = Zeroizing::new(blake3::derive_key(STREAM_KEYS, secret.expose()));
-        let hash = blake3::keyed_hash(&key, user.as_str().as_bytes());
+        let mut hasher = blake3::Hasher::new_keyed(&key);
+        hasher.update(user.as_str().as_bytes());
+        if life > 0 {
+            // No name holds a zero byte.
+            hasher.update(b"\0").update(&life.to_be_bytes());
+        }
+        let hash = hasher.finalize();
         let (key, _) = hash.as_bytes().split_first_chunk().expect("a hash has 32 bytes");
         Ok(StreamId { tenant: tenant.clone(), key: StreamKey(*key) })
+    }
+
+    fn is_erased(&self, held: &Held, stream: &StreamId) -> bool {
+        match &self.home {
+            Home::Memory => held.erased.contains(stream),
+            // Whoever's key is in hand is not erased: that spares a look at the disk.
+            Home::Directory { .. } if held.users.contains_key(stream) => false,
+            Home::Directory { dir, .. } => user_path(dir, stream, "erased").exists(),
+        }
+    }
+
+    /// Everybody of `tenant` whose key was destroyed, as the files say, in the order of their keys.
+    pub fn erased(&self, tenant: &TenantId) -> Result<Vec<StreamId>, KeyError> {
+        let mut found = match &self.home {
+            Home::Memory => {
+                let held = self.held();
+                held.erased.iter().filter(|stream| stream.tenant == *tenant).cloned().collect()
+            }
+            Home::Directory { dir, .. } => {
+                let people = dir.join("users").join(tenant.as_str());
+                let paths = if people.is_dir() { list(&people)? } else { Vec::new() };
+                let names = paths.iter().filter(|path| path.extension() == Some("erased".as_ref()));
+                let keys = names.filter_map(|path| path.file_stem()?.to_str()?.parse().ok());
+                keys.map(|key| StreamId { tenant: tenant.clone(), key }).collect::<Vec<_>>()
+            }
+        };
+        found.sort();
+        Ok(found)
+    }
+
+    /// The secret Ed25519 key that signs for a tenant.
+    pub fn signing_secret(&self, tenant: &TenantId) -> Result<Zeroizing<[u8; 32]>, KeyError> {
+        let secret = self.tenant_key(&mut self.held(), tenant)?;
+        Ok(Zeroizing::new(blake3::derive_key(SIGNING, secret.expose())))
     }
 
     /// - errors: [`KeyError::Erased`], [`KeyError::Missing`] when there never was one, or why the
@@ -328,7 +396,22 @@ impl Keys {
             Home::Memory => DataKey::random(&*self.entropy),
             Home::Directory { dir, .. } => {
                 let path = tenant_path(dir, tenant);
-                read_tenant_key(&path, tenant)?
+                let in_file = read_tenant_key(&path, tenant);
+                match secret_in_environment(tenant)? {
+                    None => in_file?,
+                    Some(secret) => match in_file {
+                        Ok(other) if other.expose() != secret.expose() => {
+                            let (variable, path) = (variable_of(tenant), show(&path));
+                            return Err(KeyError::TwoSecrets {
+                                tenant: tenant.clone(),
+                                variable,
+                                path,
+                            });
+                        }
+                        Ok(_) | Err(KeyError::NoTenant { .. }) => secret,
+                        Err(error) => return Err(error),
+                    },
+                }
             }
         };
         held.tenants.insert(tenant.clone(), key.clone());
@@ -392,6 +475,23 @@ fn user_path(dir: &Path, stream: &StreamId, extension: &str) -> PathBuf {
 /// A wrapped key moved to another person's or tenant's file does not open there.
 fn wrapping_bound(stream: &StreamId) -> Vec<u8> {
     [stream.tenant.as_str().as_bytes(), b"\0", &stream.key.0].concat()
+}
+
+/// The environment variable that may hold a tenant's secret instead of its file.
+fn variable_of(tenant: &TenantId) -> String {
+    let name = tenant.as_str().to_ascii_uppercase().replace('-', "_");
+    format!("APPRENTICE_TENANT_KEY_{name}")
+}
+
+fn secret_in_environment(tenant: &TenantId) -> Result<Option<DataKey>, KeyError> {
+    let variable = variable_of(tenant);
+    match std::env::var_os(&variable) {
+        None => Ok(None),
+        Some(text) => {
+            let text = Zeroizing::new(text.to_string_lossy().into_owned());
+            tenant_key_of(&text, Path::new(&format!("${variable}"))).map(Some)
+        }
+    }
 }
 
 fn read_tenant_key(path: &Path, tenant: &TenantId) -> Result<DataKey, KeyError> {

@@ -38,7 +38,7 @@ pub use self::layout::LAYOUT;
 pub use self::log::{AppendError, EventLog, Pending, ReadError};
 pub use self::memory::MemoryLog;
 pub use self::models::ModelStore;
-pub use self::open::{OpenError, Store, open, open_memory};
+pub use self::open::{HISTORY_FILE, OpenError, Store, open, open_memory};
 pub use self::origin::{CacheCounter, CacheCounts, Found, Origin};
 pub use self::rescue::{Loss, RescueError, StreamFound};
 pub use self::salvage::{SalvageError, Salvaged, salvage};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::cache::{Cache, MemoryCache};
 use super::check;
 use super::closed::Part;
-use super::files::{make_dir, sync_dir, write_whole};
+use super::files::{make_dir, overwrite_and_remove, sync_dir, write_whole};
 use super::import;
 use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
 use super::sled::{LogError, SledCache};
@@ -24,7 +24,12 @@ pub struct Store {
     pub models: Arc<ModelStore>,
     pub snapshots: Arc<SnapshotStore>,
     pub keys: Arc<Keys>,
+    /// Where it is kept; none in memory.
+    directory: Option<Arc<Path>>,
 }
+
+/// The file in a data directory that remembers what the person at its terminal typed.
+pub const HISTORY_FILE: &str = "history.txt";
 
 /// Why a data directory cannot be opened: a sentence that names it and says what to do.
 #[derive(Debug, thiserror::Error)]
@@ -142,7 +147,8 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
             layout::bring_up(&former, from, |_| Ok(()))?;
         }
     }
-    Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
+    let store = Store::of(Arc::new(log), Arc::new(cache), keys);
+    Ok(Store { directory: Some(Arc::from(dir)), ..store })
 }
 
 /// A store that ends with the process, for tests and for embedding without a disk.
@@ -156,7 +162,12 @@ impl Store {
     pub(super) fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
         let models = Arc::new(ModelStore::new(cache.clone(), keys.clone()));
         let snapshots = Arc::new(SnapshotStore::new(cache, keys.clone()));
-        Store { log, models, snapshots, keys }
+        Store { log, models, snapshots, keys, directory: None }
+    }
+
+    /// The same store with another log in front.
+    pub fn with_log(self, log: Arc<dyn EventLog>) -> Store {
+        Store { log, ..self }
     }
 
     /// In memory, around another log (a [`super::FaultyLog`], a seeded one).
@@ -164,15 +175,25 @@ impl Store {
         Store::of(log, Arc::new(MemoryCache::default()), keys)
     }
 
-    /// Destroys a person's key and drops their minds and snapshots. The chains still verify.
+    /// Destroys a person's key, and drops their minds, their snapshots and, in the tenant of the
+    /// single-user default, what was typed at the terminal. The chains still verify. Repeating it
+    /// is harmless.
     ///
-    /// - errors: why the key could not be destroyed. What is left in a cache is noise without it.
+    /// - errors: why the key or the typed words could not be destroyed. What is left in a cache is
+    ///   noise without the key.
     pub fn erase(&self, stream: &StreamId) -> Result<(), KeyError> {
         self.keys.erase_user_key(stream)?;
         for dropped in [self.models.keep_only(stream, &[]), self.snapshots.forget(stream)] {
             if let Err(reason) = dropped {
                 tracing::warn!(%stream, %reason, "an erased person's cache is left as noise");
             }
+        }
+        let typed = self.directory.as_ref().filter(|_| stream.tenant == TenantId::local());
+        if let Some(dir) = typed {
+            let path = dir.join(HISTORY_FILE);
+            overwrite_and_remove(&path).and_then(|()| sync_dir(dir)).map_err(|error| {
+                KeyError::Io { path: path.display().to_string(), reason: error.to_string() }
+            })?;
         }
         Ok(())
     }

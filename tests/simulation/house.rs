@@ -581,7 +581,7 @@ impl House {
     fn settle_down(&mut self) -> Result<(), Broken> {
         self.note(|| "quiet".to_owned());
         self.crash_all()?;
-        self.store = Store { log: self.inner.clone(), ..self.store.clone() };
+        self.store = self.store.clone().with_log(self.inner.clone());
         for person in 0..self.people.len() {
             for asked in self.people[person].unanswered() {
                 while self.people[person].asked[asked].heard == Heard::Nothing {

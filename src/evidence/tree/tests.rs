@@ -139,9 +139,9 @@ fn every_tree_up_to_65_leaves_agrees_with_the_definition_and_proves_every_part_o
         let tree = Tree(&leaves[..size]);
         let (count, root) = (size as u64, defined(tree.0));
         assert_eq!((tree.root(), frontier.root(), frontier.size()), (root, root, count));
-        for index in 0..size {
+        for (index, leaf) in leaves[..size].iter().enumerate() {
             let path = tree.path(index).unwrap();
-            let found = root_by_path(index as u64, count, leaves[index], &path);
+            let found = root_by_path(index as u64, count, *leaf, &path);
             assert_eq!(found, Some(root), "leaf {index} of {size}");
         }
         for old in 0..=size {

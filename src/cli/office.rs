@@ -3,12 +3,13 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::super::failure::Failure;
-use super::super::passport::Passport;
-use super::super::{data_dir, embedded};
-use crate::actors::{Book, TenantView};
-use crate::frontends::Client;
-use crate::ids::TenantId;
+use super::failure::Failure;
+use super::passport::Passport;
+use super::{data_dir, embedded};
+use crate::actors::{Book, ErrorCode, OrderError, TenantView};
+use crate::events::PersonErased;
+use crate::frontends::{Client, ClientError};
+use crate::ids::{TenantId, UserId};
 use crate::store;
 use crate::tenancy::Order;
 
@@ -17,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Where tenants are decided about.
 #[derive(Debug, Args)]
-pub(super) struct Place {
+pub struct Place {
     /// A running service.
     #[arg(long, value_name = "ENDPOINT", conflicts_with = "data")]
     connect: Option<String>,
@@ -30,7 +31,7 @@ pub(super) struct Place {
 }
 
 /// Who carries orders out. Both are the same [`Book`]; one of them is behind a service's registrar.
-pub(super) enum Office {
+pub enum Office {
     Running(Client),
     Closed(Box<Book>),
 }
@@ -48,11 +49,8 @@ impl Place {
             ));
         }
         let directory = data_dir::choose(self.data.clone())?;
-        if !make && !directory.join("LAYOUT").is_file() {
-            return Err(Failure::bad_input(format!(
-                "there is no data directory of apprentice at {}; `apprentice tenant add` makes one",
-                directory.display()
-            )));
+        if !make {
+            data_dir::must_hold_data(&directory)?;
         }
         let store = store::open(&directory).map_err(|error| match error {
             store::OpenError::InUse { .. } => Failure::bad_input(format!(
@@ -76,6 +74,28 @@ impl Office {
             Office::Closed(book) => {
                 let events = book.obey(tenant, &order).map_err(Failure::failed)?;
                 Ok(events.len() as u32)
+            }
+        }
+    }
+
+    /// - errors: with code 2, when there is no such person.
+    pub fn erase(&mut self, tenant: &TenantId, user: &UserId) -> Result<PersonErased, Failure> {
+        match self {
+            Office::Running(client) => {
+                let erased = client.erase(Some(tenant.clone()), user.clone());
+                erased.map(|view| view.erased).map_err(|error| match error {
+                    ClientError::Failed { code: ErrorCode::Refused, .. } => {
+                        Failure::bad_input(error)
+                    }
+                    error => Failure::failed(error),
+                })
+            }
+            Office::Closed(book) => {
+                let stream = book.stream_id(tenant, user).map_err(Failure::bad_input)?;
+                book.erase(&stream).map_err(|error| match error {
+                    OrderError::NobodyThere { .. } => Failure::bad_input(error),
+                    error => Failure::failed(error),
+                })
             }
         }
     }

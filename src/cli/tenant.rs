@@ -1,17 +1,15 @@
 //! Orders about tenants, to a running service or a closed data directory.
 
-mod office;
-mod overlap;
-
 use clap::{Args, Subcommand};
 
 use super::failure::Failure;
 use super::log::utc;
+use super::office::{Office, Place};
+use super::overlap;
 use crate::actors::TenantView;
 use crate::frontends::{read_public, show_key};
 use crate::ids::{PublicKey, TenantId};
 use crate::tenancy::{Order, Quotas, Role};
-use office::{Office, Place};
 
 /// Say which labs are served, with which keys, and how much of the machine each may take.
 #[derive(Debug, Args)]

@@ -1,0 +1,201 @@
+//! A person who is erased is gone from the data directory, and nobody else's records suffer.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::time::Duration;
+
+use apprentice::actors::{Book, OrderError};
+use apprentice::frontends::Client;
+use apprentice::ids::{StreamId, TenantId, UserId};
+use apprentice::language::Outcome;
+use apprentice::replay::{self, AuditReport, Scrutiny};
+use apprentice::service::{Config, Data, Service};
+use apprentice::session::{OnClash, Told};
+use apprentice::store;
+use apprentice::world::Stage;
+use apprentice::world::household::Household;
+
+/// Words that nobody else says and no file of ours holds.
+const CANARIES: [&str; 3] = ["zyxomma petiolatum", "quetzalwobble", "ada-of-the-erased"];
+
+fn user(name: &str) -> UserId {
+    UserId::new(name).unwrap()
+}
+
+fn serve(dir: &Path) -> Service {
+    let config = Config::new(Arc::new(Household::new()), Data::Directory(dir.to_owned()));
+    Service::start(config).unwrap()
+}
+
+/// An episode in which `words` is taught to mean going to the sink.
+fn live(client: &Client, words: &str) {
+    client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 7 }).unwrap();
+    client.say(words).unwrap();
+    client.say("go to the sink").unwrap();
+    client.done().unwrap();
+    let lesson = client.status().unwrap().to_teach.remove(0);
+    client.teach(lesson.seq, vec![1], OnClash::Ask).unwrap();
+    client.finish_teaching().unwrap();
+    client.wait_until_learned(Duration::from_secs(60)).unwrap();
+    assert!(understands(client, words));
+    client.done().unwrap();
+}
+
+fn understands(client: &Client, words: &str) -> bool {
+    client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 8 }).unwrap();
+    let told = client.say(words).unwrap().told;
+    let Some(Told::Answered { answer, .. }) = told.into_iter().next() else { panic!("no answer") };
+    matches!(answer.outcome, Outcome::Understood { .. })
+}
+
+fn files(dir: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => found.extend(files(&path)),
+            false => found.push(path),
+        }
+    }
+    found
+}
+
+/// The files that hold one of `needles`, byte for byte.
+fn holding(dir: &Path, needles: &[Vec<u8>]) -> Vec<PathBuf> {
+    let holds = |path: &PathBuf| {
+        let bytes = fs::read(path).unwrap();
+        needles.iter().any(|needle| bytes.windows(needle.len()).any(|part| part == needle))
+    };
+    files(dir).into_iter().filter(holds).collect()
+}
+
+fn audit(dir: &Path) -> AuditReport {
+    let copy = store::copy_private(dir).unwrap();
+    let store = copy.open().unwrap();
+    let streams = replay::streams_of(&store, None).unwrap();
+    let scrutiny = Scrutiny { repropose: true, retrain: true };
+    replay::audit(&Arc::new(Household::new()), &store, &streams, scrutiny, 2, &())
+}
+
+fn stream_of(dir: &Path, name: &str) -> StreamId {
+    let store = store::open(dir).unwrap();
+    store.keys.stream_id(&TenantId::local(), &user(name)).unwrap()
+}
+
+fn key_file(dir: &Path, stream: &StreamId) -> PathBuf {
+    dir.join(format!("keys/users/local/{}.key", stream.key))
+}
+
+#[test]
+fn nothing_of_an_erased_person_is_left_and_everybody_else_stays() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let service = serve(dir);
+    live(&service.connect(user("eve")).unwrap(), "twiddle");
+    let ada = service.connect(user(CANARIES[2])).unwrap();
+    live(&ada, CANARIES[0]);
+    live(&ada, CANARIES[1]);
+    drop(ada);
+    service.stop().unwrap();
+    fs::write(dir.join(store::HISTORY_FILE), CANARIES[0]).unwrap();
+
+    let stream = stream_of(dir, CANARIES[2]);
+    let wrapped = fs::read_to_string(key_file(dir, &stream)).unwrap();
+    let wrapped = wrapped.lines().nth(1).unwrap().to_owned();
+    let bytes: Vec<u8> = (0..wrapped.len() / 2)
+        .map(|at| u8::from_str_radix(&wrapped[2 * at..2 * at + 2], 16).unwrap())
+        .collect();
+    let mut needles: Vec<Vec<u8>> = CANARIES.iter().map(|text| text.as_bytes().to_vec()).collect();
+    // The whole wrapped key, and any 16 bytes of it.
+    needles.push(wrapped.clone().into_bytes());
+    needles.extend(bytes.chunks_exact(16).map(<[u8]>::to_vec));
+    let before = holding(dir, &needles);
+    assert_eq!(before.len(), 2, "the search finds the key and the history: {before:?}");
+
+    let service = serve(dir);
+    let ada = service.connect(user(CANARIES[2])).unwrap();
+    assert!(understands(&ada, CANARIES[1]), "she is awake when she is erased");
+    let erased = service.erase(TenantId::local(), user(CANARIES[2])).unwrap();
+    assert_eq!(erased.stream, stream.key);
+    assert_eq!(holding(dir, &needles), Vec::<PathBuf>::new(), "while the service still runs");
+    // The name is used again: by somebody who was taught nothing.
+    assert!(!understands(&ada, CANARIES[1]));
+    ada.done().unwrap();
+    let eve = service.connect(user("eve")).unwrap();
+    assert!(understands(&eve, "twiddle"));
+    drop((ada, eve));
+    service.stop().unwrap();
+    assert_eq!(holding(dir, &needles), Vec::<PathBuf>::new());
+
+    let report = audit(dir);
+    let gone = report.streams.iter().find(|found| found.stream == stream.key).unwrap();
+    assert!(gone.erased && gone.user.is_none() && gone.difference.is_none(), "{gone:?}");
+    assert_eq!((gone.head, gone.head_digest), (erased.last.get(), erased.head));
+    let differences: Vec<_> =
+        report.streams.iter().filter_map(|it| it.difference.clone()).collect();
+    assert_eq!(differences, []);
+    assert_eq!(report.counts.erased_streams, 1);
+    assert_ne!(stream_of(dir, CANARIES[2]), stream);
+}
+
+#[test]
+fn the_command_erases_in_a_closed_directory_and_says_what_it_cannot_reach() {
+    let dir = tempfile::tempdir().unwrap();
+    let service = serve(dir.path());
+    live(&service.connect(user("ada")).unwrap(), CANARIES[0]);
+    service.stop().unwrap();
+    let stream = stream_of(dir.path(), "ada");
+    let erase = |name: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
+        command.args(["erase", "--user", name, "--data"]).arg(dir.path()).output().unwrap()
+    };
+    let output = erase("ada");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && said.contains("backups"), "{said}");
+    assert!(!key_file(dir.path(), &stream).exists());
+    let output = erase("nobody");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("nothing was erased"), "{said}");
+    assert!(audit(dir.path()).streams.iter().all(|found| found.difference.is_none()));
+}
+
+#[test]
+fn an_erasure_that_a_crash_cut_short_is_recorded_at_the_next_start() {
+    let dir = tempfile::tempdir().unwrap();
+    let service = serve(dir.path());
+    live(&service.connect(user("ada")).unwrap(), "twiddle");
+    service.stop().unwrap();
+    let store = store::open(dir.path()).unwrap();
+    let stream = store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap();
+    store.keys.erase_user_key(&stream).unwrap();
+    let book = Book::open(store).unwrap();
+    let registry = book.registry(&TenantId::local());
+    assert!(registry.erased().contains_key(&stream.key));
+    drop(book);
+    assert!(audit(dir.path()).streams.iter().all(|found| found.difference.is_none()));
+}
+
+#[test]
+fn an_erasure_that_nobody_signed_and_a_key_that_came_back_are_seen_by_an_audit() {
+    let dir = tempfile::tempdir().unwrap();
+    let service = serve(dir.path());
+    live(&service.connect(user("ada")).unwrap(), "twiddle");
+    service.stop().unwrap();
+    let stream = stream_of(dir.path(), "ada");
+    let key = fs::read(key_file(dir.path(), &stream)).unwrap();
+    let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+    let erased = book.erase(&stream).unwrap();
+    assert_eq!(book.erase(&stream), Ok(erased), "doing it again is harmless");
+    let nobody = StreamId { key: apprentice::ids::StreamKey([1; 16]), ..stream.clone() };
+    assert!(matches!(book.erase(&nobody), Err(OrderError::NobodyThere { .. })));
+    drop(book);
+    // From a backup.
+    fs::write(key_file(dir.path(), &stream), key).unwrap();
+    fs::remove_file(key_file(dir.path(), &stream).with_extension("erased")).unwrap();
+    let report = audit(dir.path());
+    let found = report.streams.iter().find_map(|it| it.difference.clone()).unwrap();
+    assert_eq!(found.field, "key", "{found:?}");
+}

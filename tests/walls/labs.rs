@@ -1,0 +1,194 @@
+//! Two labs on one service, each with people, keys and words of its own.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use apprentice::actors::Ask;
+use apprentice::frontends::{Client, Counts, CurveKey, Identity, wire};
+use apprentice::ids::{PublicKey, RequestId, StreamId, TenantId, UserId};
+use apprentice::learning::Recipe;
+use apprentice::service::{self, Config, Data};
+use apprentice::session::{OnClash, Status};
+use apprentice::tenancy::{Order, Role};
+use apprentice::world::Stage;
+use apprentice::world::household::Household;
+
+const BOUND: Duration = Duration::from_secs(60);
+
+pub struct Service(service::Service);
+
+/// A key as ZeroMQ hands it out, and a client that speaks with it.
+pub struct Key {
+    pair: zmq::CurveKeyPair,
+}
+
+pub struct Lab {
+    pub name: String,
+    /// The person whom the other lab knows by name.
+    pub known: &'static str,
+    canary: String,
+    keys: BTreeMap<&'static str, Key>,
+    client: Client,
+    /// A person whose very name is the canary.
+    hidden: Client,
+}
+
+impl Service {
+    pub fn start(dir: &Path) -> Service {
+        let mut config =
+            Config::new(std::sync::Arc::new(Household::new()), Data::Directory(dir.to_owned()));
+        config.recipe_text = Recipe::builtin("default").unwrap().to_owned();
+        config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+        Service(service::Service::start(config).unwrap())
+    }
+
+    fn order(&self, name: &str, order: Order) {
+        let (sender, receiver) = mpsc::channel();
+        let tenant = TenantId::new(name).unwrap();
+        let answer = move |obeyed| sender.send(obeyed).unwrap();
+        self.0.registrar().order(tenant, order, answer);
+        receiver.recv_timeout(BOUND).unwrap().unwrap();
+    }
+
+    /// A socket that sends whatever bytes it is given.
+    pub fn wire(&self, key: &Key) -> Wire {
+        let context = zmq::Context::new();
+        let socket = context.socket(zmq::DEALER).unwrap();
+        socket.set_linger(0).unwrap();
+        socket.set_rcvtimeo(BOUND.as_millis() as i32).unwrap();
+        socket.set_curve_serverkey(&self.0.server_key().unwrap().0).unwrap();
+        socket.set_curve_publickey(&key.pair.public_key).unwrap();
+        socket.set_curve_secretkey(&key.pair.secret_key).unwrap();
+        socket.connect(&self.0.curve_endpoints()[0]).unwrap();
+        Wire { socket, waiting: BTreeMap::new() }
+    }
+
+    /// Takes a key back while its connection is open.
+    pub fn make_stale(&self, lab: &Lab, key: &str, wire: &mut Wire) {
+        let id = RequestId([0x77; 16]);
+        let (user, ask) = (UserId::new("ada").unwrap(), Ask::Hello);
+        wire.send(&[wire::encode_request(&wire::Request { id, user, ask })]);
+        wire.reply_to(id);
+        let key = lab.public(key);
+        self.order(&lab.name, Order::Retire { key, overlap_seconds: 0 });
+    }
+
+    pub fn counts(&self) -> Counts {
+        self.0.counts()
+    }
+
+    pub fn stop(self) {
+        self.0.stop().unwrap();
+    }
+}
+
+pub struct Wire {
+    socket: zmq::Socket,
+    waiting: BTreeMap<RequestId, Vec<u8>>,
+}
+
+impl Wire {
+    pub fn send(&mut self, frames: &[Vec<u8>]) {
+        self.socket.send_multipart(frames, 0).unwrap();
+    }
+
+    /// The bytes of the answer to `id`; others that come first are kept.
+    pub fn reply_to(&mut self, id: RequestId) -> Vec<u8> {
+        loop {
+            if let Some(reply) = self.waiting.remove(&id) {
+                return reply;
+            }
+            let frames =
+                self.socket.recv_multipart(0).expect("every request with an id is answered");
+            let bytes = frames.last().unwrap().clone();
+            let (answered, _) = wire::decode_response(&bytes).unwrap();
+            self.waiting.insert(answered, bytes);
+        }
+    }
+}
+
+impl Lab {
+    /// Opens the tenant and admits a key for each role, and one that will be taken back.
+    pub fn found(service: &Service, name: &str) -> Lab {
+        let canary = format!("zyx{name}quux");
+        service.order(name, Order::Open);
+        let mut keys = BTreeMap::new();
+        for (label, role) in [
+            ("gateway", Role::Gateway),
+            ("operator", Role::Operator),
+            ("auditor", Role::Auditor),
+            ("stale", Role::Operator),
+        ] {
+            let pair = zmq::CurveKeyPair::new().unwrap();
+            let key = PublicKey(pair.public_key);
+            service.order(name, Order::Admit { key, role, label: canary.clone() });
+            keys.insert(label, Key { pair });
+        }
+        let file = tempfile::tempdir().unwrap();
+        let path = file.path().join("gateway");
+        let own = CurveKey::read_or_make(&path).unwrap();
+        let label = canary.clone();
+        service.order(name, Order::Admit { key: *own.public(), role: Role::Gateway, label });
+        let connect = |user: &str| {
+            let server = *service.0.server_key().unwrap();
+            let identity = Identity { key: own.clone(), server };
+            let user = UserId::new(user).unwrap();
+            Client::connect_as(&service.0.curve_endpoints()[0], user, identity).unwrap()
+        };
+        let (client, hidden) = (connect("ada"), connect(&canary));
+        Lab { name: name.to_owned(), known: "ada", canary, keys, client, hidden }
+    }
+
+    /// Talks and teaches with words of its own.
+    pub fn live(&self) {
+        for client in [&self.client, &self.hidden] {
+            client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 7 }).unwrap();
+            client.say(&self.canary).unwrap();
+            client.say("go to the sink").unwrap();
+            client.done().unwrap();
+            let lesson = client.status().unwrap().to_teach.remove(0);
+            client.teach(lesson.seq, vec![1], OnClash::Ask).unwrap();
+            client.finish_teaching().unwrap();
+            client.wait_until_learned(BOUND).unwrap();
+            client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 8 }).unwrap();
+        }
+    }
+
+    /// What was taught still works.
+    pub fn still_lives(&self) {
+        let reply = self.client.say(&self.canary).unwrap();
+        assert!(format!("{reply:?}").contains("Understood"), "{reply:?}");
+    }
+
+    /// What anybody could have changed.
+    pub fn facts(&self, service: &Service) -> (Vec<Status>, String) {
+        let admissions = service.0.registrar().admissions();
+        let standing = admissions.standing(&self.tenant()).unwrap();
+        let people = [&self.client, &self.hidden].map(|client| client.status().unwrap());
+        (people.into(), format!("{standing:?}"))
+    }
+
+    pub fn tenant(&self) -> TenantId {
+        TenantId::new(&self.name).unwrap()
+    }
+
+    pub fn keys(&self) -> impl Iterator<Item = (&'static str, &Key)> {
+        self.keys.iter().map(|(name, key)| (*name, key))
+    }
+
+    pub fn public(&self, key: &str) -> PublicKey {
+        PublicKey(self.keys[key].pair.public_key)
+    }
+
+    /// A stream's name as it stands in logs and proofs.
+    pub fn stream_text(&self) -> String {
+        StreamId::of_tenant(&self.tenant()).to_string()
+    }
+
+    /// Whether words of this lab stand in `bytes`.
+    pub fn is_in(&self, bytes: &[u8]) -> bool {
+        super::contains(bytes, self.canary.as_bytes())
+    }
+}

@@ -1,0 +1,101 @@
+//! No lab reaches another: every verb, with every name that could lead across, from every role, by
+//! every trick we know, through real sockets. Each lab has words of its own that nobody else says;
+//! they must come up in no other lab's replies, exports and errors, and in no log line at all.
+
+mod attempts;
+mod labs;
+mod lines;
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use apprentice::ids::TenantId;
+use apprentice::store;
+
+use attempts::{Attempt, attempts};
+use labs::{Lab, Service, Wire};
+use lines::Lines;
+
+/// At least so many attempts, whatever becomes of the lists they are made from.
+const ATTEMPTS_MIN: usize = 5_000;
+
+#[test]
+fn no_attempt_to_cross_brings_out_or_changes_anything_of_another_lab() {
+    let lines = Lines::record();
+    let dir = tempfile::tempdir().unwrap();
+    let service = Service::start(dir.path());
+    let attacker = Lab::found(&service, "atoll");
+    let victim = Lab::found(&service, "borough");
+    attacker.live();
+    victim.live();
+    let before = victim.facts(&service);
+
+    let attempts = attempts(&attacker, &victim);
+    assert!(attempts.len() >= ATTEMPTS_MIN, "{} attempts", attempts.len());
+    let mut wires: BTreeMap<&str, Wire> =
+        attacker.keys().map(|(name, key)| (name, service.wire(key))).collect();
+    service.make_stale(&attacker, "stale", wires.get_mut("stale").unwrap());
+    let (mut answered, mut denied, mut kinds) = (0, 0, BTreeMap::<String, usize>::new());
+    for chunk in attempts.chunks(16) {
+        for Attempt { key, frames, .. } in chunk {
+            wires.get_mut(key).unwrap().send(frames);
+        }
+        for attempt in chunk.iter().filter(|attempt| attempt.is_answered()) {
+            let reply = wires.get_mut(attempt.key).unwrap().reply_to(attempt.id.unwrap());
+            assert!(!victim.is_in(&reply), "{attempt:?} brought out the other lab's words");
+            answered += 1;
+            denied += usize::from(contains(&reply, b"denied"));
+            *kinds.entry(attempt.trick.to_owned()).or_default() += 1;
+        }
+    }
+    println!("{} attempts, {answered} answered, {denied} denied: {kinds:?}", attempts.len());
+    assert!(denied > attempts.len() / 20, "roles are asked for: {denied}");
+
+    assert_eq!(victim.facts(&service), before, "nothing of the other lab's was changed");
+    victim.still_lives();
+    let counts = format!("{:?}", service.counts());
+    assert!(!victim.is_in(counts.as_bytes()) && !attacker.is_in(counts.as_bytes()), "{counts}");
+    drop(wires);
+    service.stop();
+
+    // What leaves the house by other ways.
+    for (lab, other) in [(&attacker, &victim), (&victim, &attacker)] {
+        let text = exported(dir.path(), &lab.name);
+        assert!(lab.is_in(&text), "the search finds a lab's own words");
+        assert!(!other.is_in(&text), "the export of {} holds the other's", lab.name);
+    }
+    let said = lines.all();
+    assert!(said.contains("listening"), "the log was recorded");
+    for lab in [&attacker, &victim] {
+        let leaked = said.lines().find(|line| lab.is_in(line.as_bytes()));
+        assert_eq!(leaked, None, "people's words in a log line");
+    }
+}
+
+fn contains(bytes: &[u8], part: &[u8]) -> bool {
+    bytes.windows(part.len()).any(|window| window == part)
+}
+
+/// The decrypted records of one tenant, as the command writes them, and what it says about it.
+fn exported(dir: &std::path::Path, name: &str) -> Vec<u8> {
+    let out = dir.join(format!("../{name}.ndjson"));
+    let out = out.as_path();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
+    command.args(["export", "--ndjson", "--tenant", name, "--data"]).arg(dir);
+    let output = command.arg("--out").arg(out).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read(out).unwrap();
+    std::fs::remove_file(out).unwrap();
+    [text, output.stdout, output.stderr].concat()
+}
+
+#[test]
+fn a_store_gives_one_tenants_streams_to_nobody_who_asks_as_another() {
+    let store = store::open_memory();
+    let [a, b] = ["atoll", "borough"].map(|name| TenantId::new(name).unwrap());
+    let user = apprentice::ids::UserId::new("ada").unwrap();
+    let of = |tenant: &TenantId| store.keys.stream_id(tenant, &user).unwrap();
+    assert_ne!(of(&a).key, of(&b).key, "not even under a hash");
+    let moved = apprentice::ids::StreamId { tenant: a.clone(), key: of(&b).key };
+    assert_eq!(store.log.head(&moved).unwrap().seq, 0);
+}
