@@ -1,35 +1,47 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::actors::ErasedView;
 use crate::ids::{RequestId, TenantId};
 
 /// Erasures of late, by the requests that asked for them. A name that was erased stands for
 /// somebody new as soon as it is used again, so a request that is sent once more, because its answer
 /// was lost, must not erase that one too.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Erasures(Arc<Mutex<Inner>>);
+///
+/// - `V`: what is answered.
+#[derive(Debug)]
+pub(super) struct Erasures<V>(Arc<Mutex<Inner<V>>>);
 
-#[derive(Debug, Default)]
-struct Inner {
-    asked: BTreeMap<(TenantId, RequestId), Option<ErasedView>>,
+#[derive(Debug)]
+struct Inner<V> {
+    asked: BTreeMap<(TenantId, RequestId), Option<V>>,
     order: VecDeque<(TenantId, RequestId)>,
 }
 
 /// What is to be done about a request.
 #[derive(Debug, PartialEq)]
-pub(super) enum Asked {
+pub(super) enum Asked<V> {
     /// It is new.
     First,
     UnderWay,
-    Done(ErasedView),
+    Done(V),
 }
 
 /// Far more than are asked for while a client retries.
 const REMEMBERED_MAX: usize = 4_096;
 
-impl Erasures {
-    pub fn ask(&self, tenant: &TenantId, id: RequestId) -> Asked {
+impl<V> Clone for Erasures<V> {
+    fn clone(&self) -> Self {
+        Erasures(self.0.clone())
+    }
+}
+
+impl<V: Clone> Erasures<V> {
+    pub fn new() -> Erasures<V> {
+        let (asked, order) = (BTreeMap::new(), VecDeque::new());
+        Erasures(Arc::new(Mutex::new(Inner { asked, order })))
+    }
+
+    pub fn ask(&self, tenant: &TenantId, id: RequestId) -> Asked<V> {
         let mut inner = self.lock();
         let name = (tenant.clone(), id);
         match inner.asked.get(&name) {
@@ -48,7 +60,7 @@ impl Erasures {
     }
 
     /// - `view`: none when it went wrong: the request may be tried again.
-    pub fn end(&self, tenant: &TenantId, id: RequestId, view: Option<ErasedView>) {
+    pub fn end(&self, tenant: &TenantId, id: RequestId, view: Option<V>) {
         let mut inner = self.lock();
         let name = (tenant.clone(), id);
         match view {
@@ -66,7 +78,7 @@ impl Erasures {
     }
 
     // Two collections that a panic cannot leave in half: each change is one call.
-    fn lock(&self) -> MutexGuard<'_, Inner> {
+    fn lock(&self) -> MutexGuard<'_, Inner<V>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -74,27 +86,18 @@ impl Erasures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::events::PersonErased;
-    use crate::ids::{Digest, Seq, Signature, StreamKey};
 
     #[test]
     fn a_request_erases_once_however_often_it_is_sent() {
-        let (erasures, lab) = (Erasures::default(), TenantId::new("lab").unwrap());
+        let (erasures, lab) = (Erasures::new(), TenantId::new("lab").unwrap());
         let id = RequestId([1; 16]);
-        let erased = PersonErased {
-            stream: StreamKey([7; 16]),
-            last: Seq::FIRST,
-            head: Digest::ZERO,
-            signature: Signature([9; 64]),
-        };
-        let view = ErasedView { tenant: lab.clone(), erased };
         assert_eq!(erasures.ask(&lab, id), Asked::First);
         assert_eq!(erasures.ask(&lab, id), Asked::UnderWay);
         assert_eq!(erasures.ask(&TenantId::local(), id), Asked::First, "another lab's request");
         erasures.end(&lab, id, None);
         assert_eq!(erasures.ask(&lab, id), Asked::First, "it went wrong and is tried again");
-        erasures.end(&lab, id, Some(view.clone()));
-        assert_eq!(erasures.ask(&lab, id), Asked::Done(view));
+        erasures.end(&lab, id, Some("erased"));
+        assert_eq!(erasures.ask(&lab, id), Asked::Done("erased"));
         for number in 0..2 * REMEMBERED_MAX as u64 {
             let mut bytes = [2; 16];
             bytes[..8].copy_from_slice(&number.to_be_bytes());
