@@ -11,12 +11,12 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, ErrorCode, Response};
+use apprentice::actors::{Ask, ErrorCode, Response, TenantAsk, TenantVerb};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
 use apprentice::ids::{PublicKey, TenantId, UserId};
 use apprentice::service::{Data, Service, StartError, server_key_file};
-use apprentice::tenancy::{Order, Role};
+use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::Stage;
 use toy::config;
 
@@ -226,7 +226,8 @@ fn whoever_knocks_at_the_wrong_door_or_at_a_wrong_service_is_told_so() {
     assert!(matches!(error, ClientError::WrongServer { .. }), "{error}");
     assert!(error.to_string().contains("keys show"), "{error}");
     service.stop().unwrap();
-    let gone = connect_to(&locked, &key, PublicKey([1; 32]));
+    // A port that nobody listens at, and that nobody is given meanwhile.
+    let gone = connect_to("tcp://127.0.0.1:1", &key, PublicKey([1; 32]));
     let error = timed(gone.with_patience(Duration::from_millis(300)));
     assert!(matches!(error, ClientError::NoAnswer { .. }), "{error}");
 }
@@ -349,6 +350,207 @@ fn a_service_keeps_its_key_and_its_labs_over_a_restart() {
     config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
     let error = Service::start(config).err().expect("others can read its key");
     assert!(error.to_string().contains("chmod 600"), "{error}");
+}
+
+/// The code of an order that was not carried out, and the sentence.
+fn refused<T: std::fmt::Debug>(result: Result<T, ClientError>) -> (ErrorCode, String) {
+    match result {
+        Err(ClientError::Failed { code, message }) => (code, message),
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+#[test]
+fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_keys() {
+    let service = bells(Data::Memory);
+    let (host_key, a_key, b_key) =
+        (CurveKey::new().unwrap(), CurveKey::new().unwrap(), CurveKey::new().unwrap());
+    let admit = |key: &CurveKey, role| Order::Admit {
+        key: *key.public(),
+        role,
+        label: "by the host".to_owned(),
+    };
+    // The single user of this machine begins, without any set-up.
+    let local = Client::connect(service.endpoint().unwrap(), user("root")).unwrap();
+    local.order(None, admit(&host_key, Role::Operator)).unwrap();
+    let host = connect(&service, &host_key, "host");
+    for (lab, key) in [("lab-a", &a_key), ("lab-b", &b_key)] {
+        assert_eq!(host.order(Some(tenant(lab)), Order::Open).unwrap().recorded, 1);
+        assert_eq!(host.order(Some(tenant(lab)), Order::Open).unwrap().recorded, 0);
+        host.order(Some(tenant(lab)), admit(key, Role::Operator)).unwrap();
+    }
+    let names = |client: &Client, only: Option<&str>| -> Vec<String> {
+        let tenants = client.tenants(only.map(tenant)).unwrap();
+        tenants.iter().map(|view| view.tenant.to_string()).collect()
+    };
+    assert_eq!(names(&host, None), ["lab-a", "lab-b", "local"]);
+    let a = connect(&service, &a_key, "operator of a");
+    assert_eq!(names(&a, None), ["lab-a"], "its own and no other");
+    assert_eq!(a.tenants(None).unwrap()[0].keys.len(), 1);
+
+    // Its own keys are its own affair.
+    let gateway = CurveKey::new().unwrap();
+    a.order(None, admit(&gateway, Role::Gateway)).unwrap();
+    connect(&service, &gateway, "ada").start(task()).unwrap();
+    let next = CurveKey::new().unwrap();
+    let rotate = Order::Rotate { old: *gateway.public(), new: *next.public(), overlap_seconds: 0 };
+    assert_eq!(a.order(Some(tenant("lab-a")), rotate).unwrap().recorded, 2);
+    assert_eq!(connect(&service, &next, "ada").status().unwrap().episodes, 1);
+
+    // The others' are not, nor is what protects them.
+    let quotas = Quotas { awake_users: Some(1_000_000), ..Quotas::default() };
+    let disable = || Order::Disable { reason: "rivalry".to_owned() };
+    for (about, order) in [
+        (Some("lab-b"), admit(&CurveKey::new().unwrap(), Role::Gateway)),
+        (Some("lab-b"), Order::Retire { key: *b_key.public(), overlap_seconds: 0 }),
+        (Some("lab-b"), disable()),
+        (Some("local"), admit(&CurveKey::new().unwrap(), Role::Operator)),
+        (Some("lab-c"), Order::Open),
+        (None, Order::SetQuotas(quotas)),
+        (None, disable()),
+    ] {
+        let message = denied(a.order(about.map(tenant), order));
+        assert!(message.contains("tenant local"), "{message}");
+    }
+    denied(a.tenants(Some(tenant("lab-b"))));
+    for role in [Role::Gateway, Role::Auditor] {
+        let key = CurveKey::new().unwrap();
+        host.order(Some(tenant("lab-b")), admit(&key, role)).unwrap();
+        let message = denied(connect(&service, &key, "b").tenants(None));
+        assert_eq!(message, format!("this needs a key with the role operator; yours is {role}"));
+    }
+
+    // What makes no sense is refused by name, and what is another's key says no more than that.
+    let (code, message) = refused(a.order(None, admit(&a_key, Role::Auditor)));
+    assert!(code == ErrorCode::Refused && message.contains("operator"), "{message}");
+    let (code, message) = refused(a.order(None, admit(&b_key, Role::Gateway)));
+    assert!(code == ErrorCode::Refused && !message.contains("lab-b"), "{message}");
+    let (code, message) = refused(host.order(Some(tenant("lab-x")), Order::Enable));
+    assert!(code == ErrorCode::Refused && message.contains("add it first"), "{message}");
+    host.order(Some(tenant("lab-a")), Order::SetQuotas(quotas)).unwrap();
+    assert_eq!(a.tenants(None).unwrap()[0].quotas, quotas);
+
+    // A lab's operator erases its people, not the other lab's.
+    let ada = connect(&service, &next, "ada");
+    denied(a.erase(Some(tenant("lab-b")), user("ada")));
+    denied(ada.erase(None, user("ada")));
+    let verb = TenantVerb::Erase { user: user("ada") };
+    let ask = Ask::Order(TenantAsk { tenant: None, verb });
+    let request = Request { id: fresh_id(), user: user("operator of a"), ask };
+    let folder = tempfile::tempdir().unwrap();
+    let socket = stranger(&service, &a_key, &folder);
+    socket.connect(&service.curve_endpoints()[0]).unwrap();
+    let erase = || {
+        socket.send(encode_request(&request), 0).unwrap();
+        assert_eq!(socket.poll(zmq::POLLIN, 30_000).unwrap(), 1, "an answer within 30 s");
+        match decode_response(&socket.recv_bytes(0).unwrap()).unwrap() {
+            (_, Response::Erased(view)) => view,
+            other => panic!("{other:?}"),
+        }
+    };
+    let first = erase();
+    assert_eq!(ada.status().unwrap().episodes, 0, "somebody new");
+    ada.start(task()).unwrap();
+    // The answer was lost, say, and the request is sent once more.
+    assert_eq!(erase(), first);
+    assert_eq!(ada.status().unwrap().episodes, 1, "the new bearer of the name is not erased");
+    let second = a.erase(None, user("ada")).unwrap();
+    assert_ne!(second.erased.stream, first.erased.stream);
+    let (code, message) = refused(a.erase(None, user("nobody")));
+    assert!(code == ErrorCode::Refused && message.contains("no records"), "{message}");
+
+    // An operator can shut the door behind themselves.
+    a.order(None, Order::Retire { key: *a_key.public(), overlap_seconds: 0 }).unwrap();
+    denied(a.tenants(None));
+    service.stop().unwrap();
+}
+
+fn apprentice(arguments: &[&str]) -> process::Output {
+    process::Command::new(env!("CARGO_BIN_EXE_apprentice")).args(arguments).output().unwrap()
+}
+
+/// What a command printed; it went well.
+fn said(arguments: &[&str]) -> String {
+    let output = apprentice(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// What a command complained of, with its exit code.
+fn complained(arguments: &[&str]) -> (i32, String) {
+    let output = apprentice(arguments);
+    (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (data, host, lab, next) = (path("data"), path("host"), path("lab"), path("next"));
+    let (code, text) = complained(&["tenant", "list", "--data", &data]);
+    assert!(code == 2 && text.contains("no data directory"), "{text}");
+    for file in [&host, &lab, &next] {
+        let printed = said(&["keys", "new", "--out", file]);
+        assert_eq!(printed, fs::read_to_string(format!("{file}.pub")).unwrap());
+    }
+    let (code, text) = complained(&["keys", "new", "--out", &lab]);
+    assert!(code == 2 && text.contains("is there already"), "{text}");
+    let public = |file: &str| format!("{file}.pub");
+
+    // Closed: the first tenant makes the directory.
+    let (host_pub, lab_pub, next_pub) = (public(&host), public(&lab), public(&next));
+    said(&["tenant", "add", "lab-a", "--data", &data]);
+    said(&["tenant", "admit", "local", &host_pub, "--role", "operator", "--data", &data]);
+    let label = ["--label", "room 7"];
+    let admit = ["tenant", "admit", "lab-a", &lab_pub, "--role", "gateway", label[0], label[1]];
+    let closed = [&admit[..], &["--data", &data]].concat();
+    assert_eq!(said(&closed), "tenant lab-a: done\n");
+    assert_eq!(said(&closed), "tenant lab-a: it was so already\n");
+    let listed = said(&["tenant", "list", "lab-a", "--data", &data]);
+    let printed = fs::read_to_string(&lab_pub).unwrap();
+    assert!(listed.contains(printed.trim()) && listed.contains("room 7"), "{listed}");
+    let (code, text) = complained(&["tenant", "list", "lab-z", "--data", &data]);
+    assert!(code == 1 && text.contains("no tenant lab-z"), "{text}");
+
+    // Running: the same words, with the operator's key.
+    let mut config = config(Data::Directory(folder.path().join("data")));
+    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+    let service = Service::start(config).unwrap();
+    let server = said(&["keys", "show", "--data", &data]);
+    let endpoint = service.curve_endpoints()[0].clone();
+    let (code, text) = complained(&closed.iter().map(|word| &**word).collect::<Vec<&str>>());
+    assert!(code == 2 && text.contains("--connect"), "{text}");
+    let as_host = ["--connect", &endpoint, "--key", &host, "--server-key", server.trim()];
+    assert_eq!(said(&[&admit[..], &as_host].concat()), "tenant lab-a: it was so already\n");
+    assert_eq!(said(&[&["tenant", "list", "lab-a"][..], &as_host].concat()), listed);
+    let ada =
+        connect(&service, &CurveKey::read(folder.path().join("lab").as_path()).unwrap(), "ada");
+    ada.start(task()).unwrap();
+    let rotate = ["tenant", "rotate-key", "lab-a", &lab_pub, &next_pub, "--overlap", "0s"];
+    said(&[&rotate[..], &as_host].concat());
+    denied(ada.status());
+    let ada =
+        connect(&service, &CurveKey::read(folder.path().join("next").as_path()).unwrap(), "ada");
+    assert_eq!(ada.status().unwrap().episodes, 1);
+    let quotas = ["tenant", "quotas", "lab-a", "--awake-users", "5"];
+    said(&[&quotas[..], &as_host].concat());
+    assert_eq!(said(&[&quotas[..3], &as_host].concat()), "lab-a: at most 5 people awake\n");
+    said(&[&["tenant", "disable", "lab-a", "--reason", "unpaid"][..], &as_host].concat());
+    denied(ada.status());
+    said(&[&["tenant", "enable", "lab-a"][..], &as_host].concat());
+    ada.status().unwrap();
+    let as_lab = ["--connect", &endpoint, "--key", &next, "--server-key", server.trim()];
+    let (code, text) = complained(&[&["tenant", "list"][..], &as_lab].concat());
+    assert!(code == 1 && text.contains("the role operator; yours is gateway"), "{text}");
+    let talk = ["talk", "--connect", &endpoint, "--key", &lab, "--server-key", server.trim()];
+    let (code, text) = complained(&talk);
+    assert!(code == 1 && text.contains("does not let in your key"), "{text}");
+    service.stop().unwrap();
+
+    // And closed again: what was ordered is there.
+    let listed = said(&["tenant", "list", "lab-a", "--data", &data]);
+    assert!(listed.contains("at most 5 people awake") && listed.contains("until"), "{listed}");
 }
 
 /// A server whose handshakes nobody answers would let everybody in: it must end instead.

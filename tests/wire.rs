@@ -11,13 +11,17 @@ use std::fs;
 use std::path::PathBuf;
 
 use apprentice::actors::{
-    Ask, Busy, ErrorCode, Failed, Hello, Quota, QuotaExceeded, Rejected, Response, Waited,
+    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, KeyView, Ordered, Quota, QuotaExceeded,
+    Rejected, Response, TenantAsk, TenantVerb, TenantView, Waited,
 };
-use apprentice::events::{Ending, Report};
+use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::frontends::wire::{
-    COMMANDS, QUERIES, Request, decode_request, decode_response, encode_request, encode_response,
+    COMMANDS, ORDERS, QUERIES, Request, decode_request, decode_response, encode_request,
+    encode_response,
 };
-use apprentice::ids::{Digest, RequestId, Seq, UserId};
+use apprentice::ids::{
+    Digest, PublicKey, RequestId, Seq, Signature, StreamKey, TenantId, Timestamp, UserId,
+};
 use apprentice::language::{
     Answer, Discarded, Evidence, Exemplar, LiftedUtterance, Near, Outcome, Symbol,
 };
@@ -26,6 +30,7 @@ use apprentice::session::{
     ActionView, Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status,
     Teachable, Told,
 };
+use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::{Stage, Thing, View};
 use value::Value;
 
@@ -67,7 +72,43 @@ fn requests() -> Vec<(&'static str, Ask)> {
         ("known", Ask::Query(Query::Known)),
         ("wait", Ask::Wait { seconds: 20 }),
         ("hello", Ask::Hello),
+        ("list", order(None, TenantVerb::List)),
+        ("add", give(Order::Open)),
+        (
+            "admit",
+            give(Order::Admit {
+                key: key(1),
+                role: Role::Gateway,
+                label: "robot in room 7".into(),
+            }),
+        ),
+        ("retire", give(Order::Retire { key: key(1), overlap_seconds: 0 })),
+        ("rotate", give(Order::Rotate { old: key(1), new: key(2), overlap_seconds: 604_800 })),
+        ("disable", give(Order::Disable { reason: "the study is over".into() })),
+        ("enable", give(Order::Enable)),
+        ("set_quotas", give(Order::SetQuotas(quotas()))),
+        ("erase", order(Some(lab()), TenantVerb::Erase { user: UserId::new("grace").unwrap() })),
     ]
+}
+
+fn lab() -> TenantId {
+    TenantId::new("lab-a").unwrap()
+}
+
+fn key(number: u8) -> PublicKey {
+    PublicKey([number; 32])
+}
+
+fn quotas() -> Quotas {
+    Quotas { awake_users: Some(50), utterances_per_second: Some(20), ..Quotas::default() }
+}
+
+fn order(tenant: Option<TenantId>, verb: TenantVerb) -> Ask {
+    Ask::Order(TenantAsk { tenant, verb })
+}
+
+fn give(this: Order) -> Ask {
+    order(Some(lab()), TenantVerb::Give(this))
 }
 
 fn evidence() -> Evidence {
@@ -234,6 +275,41 @@ fn responses() -> Vec<(&'static str, Response)> {
                 recipe: "default".into(),
             }),
         ),
+        ("ordered", Response::Ordered(Ordered { tenant: lab(), recorded: 1 })),
+        (
+            "tenants answer",
+            Response::Tenants(vec![TenantView {
+                tenant: lab(),
+                disabled: None,
+                quotas: quotas(),
+                keys: vec![KeyView {
+                    key: key(1),
+                    role: Role::Gateway,
+                    label: "robot in room 7".into(),
+                    admitted_at: Timestamp(1_790_000_000_000_000),
+                    valid_until: Some(Timestamp(1_790_604_800_000_000)),
+                }],
+            }]),
+        ),
+        (
+            "erased",
+            Response::Erased(ErasedView {
+                tenant: lab(),
+                erased: PersonErased {
+                    stream: StreamKey([7; 16]),
+                    last: seq(41),
+                    head: mind(),
+                    signature: Signature([9; 64]),
+                },
+            }),
+        ),
+        (
+            "denied",
+            Response::Error(Failed {
+                code: ErrorCode::Denied,
+                message: "this needs a key with the role gateway; yours is auditor".into(),
+            }),
+        ),
         (
             "rejected",
             Response::Rejected(Rejected {
@@ -357,7 +433,7 @@ fn every_example_is_understood_and_written_back_alike() {
 #[test]
 fn every_verb_has_an_example() {
     let names: Vec<&str> = requests().iter().map(|(name, _)| *name).collect();
-    for verb in COMMANDS.iter().chain(&QUERIES) {
+    for verb in COMMANDS.iter().chain(&QUERIES).chain(&ORDERS) {
         assert!(names.contains(verb), "{verb}");
     }
 }
@@ -426,6 +502,26 @@ fn commands_from_inside_the_service_are_refused_at_the_door() {
         assert_eq!(code, ErrorCode::InternalVerb);
         assert!(message.contains(name), "{message}");
     }
+}
+
+/// Records of erasures and of evidence come from the service itself, however well somebody knows
+/// how they are spelled.
+#[test]
+fn orders_from_inside_the_service_are_none_at_the_door() {
+    for name in ["open", "note_erasure", "close_segment"] {
+        let bytes = request_with(&[("command", None), ("order", verb(name, Value::Map(vec![])))]);
+        let (answerable, code, message) = refusal(&bytes);
+        assert!(answerable, "{message}");
+        assert_eq!(code, ErrorCode::UnknownVerb);
+        assert!(message.contains(name), "{message}");
+    }
+    let path = request_with(&[
+        ("command", None),
+        ("order", Some(Value::Text("list".into()))),
+        ("tenant", Some(Value::Text("../lab-a".into()))),
+    ]);
+    let (answerable, code, message) = refusal(&path);
+    assert!(answerable && code == ErrorCode::Malformed && message.contains("tenant"), "{message}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use super::life::fresh_request;
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};
-use crate::ids::{Seq, StreamId, TenantId, Timestamp};
+use crate::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::replay::{self, CheckpointsError, Through};
 use crate::store::{AppendError, KeyError, ReadError, Store};
 use crate::tenancy::{self, Admissions, Disagreement, Order, Refusal, Registry};
@@ -71,9 +71,18 @@ impl Book {
         &self.admissions
     }
 
+    /// The stream of a person.
+    pub fn stream_id(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
+        self.store.keys.stream_id(tenant, user)
+    }
+
     /// A tenant's stream, folded; the default for one without records.
     pub fn registry(&self, tenant: &TenantId) -> Registry {
         self.registries.get(tenant).cloned().unwrap_or_default()
+    }
+
+    fn is_open(&self, tenant: &TenantId) -> bool {
+        self.registries.get(tenant).is_some_and(Registry::is_open)
     }
 
     /// Decides, appends durably, applies, and lets the doors know. Blocks.
@@ -85,18 +94,29 @@ impl Book {
         {
             return Err(OrderError::KeyOfOther);
         }
+        // The tenant of the single-user default is there without having been added.
+        if *tenant == TenantId::local() && *order != Order::Open && !self.is_open(tenant) {
+            self.obey(tenant, &Order::Open)?;
+        }
         let key_error = |error| OrderError::Key { tenant: tenant.clone(), error };
         // The only order that may make a secret: records behind a lost one would be lost too.
         if *order == Order::Open && !self.registries.contains_key(tenant) {
             self.store.keys.make_tenant(tenant).map_err(key_error)?;
         }
+        let unknown = !self.registries.contains_key(tenant);
         let registry = self.registries.entry(tenant.clone()).or_default();
         let at = registry.next_at(now());
-        let events = tenancy::decide(registry, order, at)
-            .map_err(|refusal| OrderError::Refused { tenant: tenant.clone(), refusal })?;
-        if events.is_empty() {
-            return Ok(events);
-        }
+        let events = match tenancy::decide(registry, order, at) {
+            Ok(events) if events.is_empty() => return Ok(events),
+            Ok(events) => events,
+            Err(refusal) => {
+                // A name in an order does not make a tenant.
+                if unknown {
+                    self.registries.remove(tenant);
+                }
+                return Err(OrderError::Refused { tenant: tenant.clone(), refusal });
+            }
+        };
         let batch = Batch { request: fresh_request(), at, events: events.clone() };
         let stream = StreamId::of_tenant(tenant);
         let appended = self.store.log.append(&stream, registry.head(), batch).wait();
@@ -313,6 +333,17 @@ mod tests {
         let refusal = book.obey(&lab(), &admit(KEY)).unwrap_err().to_string();
         assert!(refusal.contains("add it first"), "{refusal}");
         assert!(!dir.path().join("keys/lab.key").exists());
+        // Being named once too early is no obstacle to being added.
+        book.obey(&lab(), &Order::Open).unwrap();
+        assert!(dir.path().join("keys/lab.key").exists());
+        book.obey(&lab(), &admit(KEY)).unwrap();
+    }
+
+    #[test]
+    fn the_tenant_of_this_machine_need_not_be_added() {
+        let mut book = Book::open(store::open_memory()).unwrap();
+        assert_eq!(book.obey(&TenantId::local(), &admit(KEY)).unwrap().len(), 1);
+        assert!(book.registry(&TenantId::local()).is_open());
     }
 
     #[test]

@@ -74,7 +74,8 @@ pub enum ActorsError {
 /// Where front ends hand in requests. Knows no domain.
 #[derive(Clone)]
 pub struct Front {
-    directory: Recipient<Submit>,
+    submit: Recipient<Submit>,
+    farewell: Recipient<Farewell>,
     meters: Arc<Meters>,
 }
 
@@ -89,12 +90,22 @@ pub enum NotTaken {
 }
 
 impl Front {
+    /// As [`House::erase`]; when everybody is gone, `answer` is dropped.
+    pub fn erase(
+        &self,
+        tenant: TenantId,
+        user: UserId,
+        answer: impl FnOnce(Erased) + Send + 'static,
+    ) {
+        self.farewell.do_send(Farewell { tenant, user, answer: Box::new(answer) });
+    }
+
     pub fn submit(&self, mut submit: Submit) -> Result<(), NotTaken> {
         match self.meters.admit(&submit.tenant, &submit.ask) {
             Ok(in_flight) => submit.answer.let_in(in_flight),
             Err(response) => return Err(NotTaken::Over(Box::new(submit), response)),
         }
-        self.directory.try_send(submit).map_err(|error| match error {
+        self.submit.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
             SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
         })
@@ -188,7 +199,9 @@ impl House {
     }
 
     pub fn front(&self) -> Front {
-        Front { directory: self.directory.clone().recipient(), meters: self.meters.clone() }
+        let (directory, meters) = (self.directory.clone(), self.meters.clone());
+        let submit = directory.clone().recipient();
+        Front { submit, farewell: directory.recipient(), meters }
     }
 
     /// What each tenant takes, and how often it was turned away.

@@ -142,8 +142,8 @@ impl Meters {
         let cost = match ask {
             Ask::Command(_) => TOKEN,
             Ask::Query(_) | Ask::Wait { .. } => QUERY_COST,
-            // Wakes nobody and reads nothing.
-            Ask::Hello => return Ok(()),
+            // Wakes nobody and reads nothing; orders have a queue of their own.
+            Ask::Hello | Ask::Order(_) => return Ok(()),
         };
         let burst = quotas.burst.unwrap_or(rate);
         let now_us = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);

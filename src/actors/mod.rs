@@ -8,6 +8,7 @@ mod farewell;
 mod house;
 mod life;
 mod meters;
+mod operator;
 mod registrar;
 mod response;
 mod submit;
@@ -18,6 +19,7 @@ pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
 pub use meters::{Refusals, Usage};
+pub use operator::{ErasedView, KeyView, Ordered, TenantAsk, TenantVerb, TenantView};
 pub use registrar::{Erased, Obeyed, Registrar, Signed};
 pub use response::{
     Ask, Busy, ErrorCode, Failed, Hello, Quota, QuotaExceeded, Rejected, Response, Waited,

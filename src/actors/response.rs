@@ -1,11 +1,12 @@
 use serde::{Deserialize, Serialize};
 
+use super::operator::{ErasedView, Ordered, TenantAsk, TenantView};
 use crate::session::{
     Command, KnownExemplar, Query, Rejection, RejectionCode, Reply, Status, Told,
 };
 use crate::world::View;
 
-/// What a person may ask of the service.
+/// What may be asked of the service.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ask {
     Command(Command),
@@ -16,6 +17,8 @@ pub enum Ask {
     },
     /// Who is there. Wakes nobody.
     Hello,
+    /// An operator's, about a tenant. The doors hand it to the registrar, and to nobody's actor.
+    Order(TenantAsk),
 }
 
 /// What the service answers.
@@ -28,6 +31,9 @@ pub enum Response {
     Known(Vec<KnownExemplar>),
     Waited(Waited),
     Hello(Hello),
+    Ordered(Ordered),
+    Tenants(Vec<TenantView>),
+    Erased(ErasedView),
     /// Declined; nothing was recorded.
     Rejected(Rejected),
     /// Not now. The same request id may be sent again.
@@ -119,6 +125,8 @@ pub enum ErrorCode {
     InternalVerb,
     /// Whoever asks may not ask this.
     Denied,
+    /// An order that does not fit the tenant as it stands; nothing was recorded.
+    Refused,
     /// This person's stream cannot be read or written now; an operator must look.
     Unavailable,
     /// We are wrong: a defect, with what is known about it.

@@ -115,6 +115,7 @@ impl<D: Domain> UserActor<D> {
             },
             Ask::Wait { seconds } => self.wait(seconds, answer, ctx),
             Ask::Hello => unreachable!("the directory answers hello"),
+            Ask::Order(_) => unreachable!("the gateway hands orders to the registrar"),
         }
         Self::done()
     }

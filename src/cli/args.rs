@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::logging::Logging;
 use super::{
     audit, check_copy, checkpoint, converse, erase, eval, export, import, keys, log, proof, replay,
-    salvage, self_test, serve, talk, transcript, verify,
+    salvage, self_test, serve, talk, tenant, transcript, verify,
 };
 use crate::store;
 
@@ -54,6 +54,7 @@ enum Verb {
     Serve(serve::Arguments),
     Talk(talk::Arguments),
     Keys(keys::Arguments),
+    Tenant(tenant::Arguments),
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
     Log(log::Arguments),
@@ -98,6 +99,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Serve(arguments)) => serve::run(arguments),
         Some(Verb::Talk(arguments)) => talk::run(arguments),
         Some(Verb::Keys(arguments)) => keys::run(arguments),
+        Some(Verb::Tenant(arguments)) => tenant::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),

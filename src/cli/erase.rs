@@ -1,14 +1,11 @@
-use std::path::PathBuf;
-
 use clap::Args;
 use serde_json::json;
 
+use super::embedded;
 use super::failure::Failure;
-use super::{data_dir, embedded};
-use crate::actors::{Book, OrderError};
+use super::office::Place;
 use crate::events::PersonErased;
 use crate::ids::TenantId;
-use crate::store;
 
 /// Erase a person: destroy the key that everything of theirs is sealed with.
 ///
@@ -25,15 +22,15 @@ use crate::store;
 Examples:
   apprentice erase --data lab --tenant robotics --user ada
   apprentice erase --data lab --user you --json
+  apprentice erase --tenant robotics --user ada --connect tcp://robot.example:7117 \
+      --key operator.key --server-key server.pub
 
 It can not be taken back, and asks nothing. Doing it again is harmless.
 
 Exit codes: 0 erased, 1 it went wrong, 2 there is no such person, or no such directory.")]
 pub struct Arguments {
-    /// The data directory; no service may have it open
-    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
     /// The lab the person belongs to.
     #[arg(long, value_name = "NAME", default_value = "local")]
     tenant: String,
@@ -48,15 +45,7 @@ pub struct Arguments {
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
     let user = embedded::user(&arguments.user)?;
-    let directory = data_dir::choose(arguments.data)?;
-    data_dir::must_hold_data(&directory)?;
-    let store = store::open(&directory).map_err(Failure::bad_input)?;
-    let stream = store.keys.stream_id(&tenant, &user).map_err(Failure::bad_input)?;
-    let mut book = Book::open(store).map_err(Failure::failed)?;
-    let erased = book.erase(&stream).map_err(|error| match error {
-        OrderError::NobodyThere { .. } => Failure::bad_input(error),
-        error => Failure::failed(error),
-    })?;
+    let erased = arguments.place.enter(false)?.erase(&tenant, &user)?;
     say(&tenant, &erased, arguments.json);
     Ok(())
 }

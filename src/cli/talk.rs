@@ -3,7 +3,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::failure::Failure;
-use super::whereto::Whereto;
+use super::passport::Passport;
 use super::{embedded, terminal};
 
 /// How long a service may take to say hello before it is taken for absent.
@@ -21,8 +21,11 @@ Examples:
 
 Exit codes: 0 the conversation ended, 1 no answer or the service failed, 2 bad usage.")]
 pub struct Arguments {
+    /// Where the service listens.
+    #[arg(long, value_name = "ENDPOINT")]
+    connect: String,
     #[command(flatten)]
-    whereto: Whereto,
+    passport: Passport,
     /// Who is talking: each person teaches a robot of their own.
     #[arg(long, value_name = "NAME", default_value = "you")]
     user: String,
@@ -37,7 +40,7 @@ pub struct Arguments {
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let user = embedded::user(&arguments.user)?;
-    let client = arguments.whereto.client(user)?.with_patience(HELLO_PATIENCE);
+    let client = arguments.passport.client(&arguments.connect, user)?.with_patience(HELLO_PATIENCE);
     client.hello().map_err(Failure::failed)?;
     let client = client.with_patience(PATIENCE);
     terminal::talk(&client, arguments.seed, arguments.task, None)

@@ -4,10 +4,14 @@ use std::time::{Duration, Instant};
 use super::knock::{Knock, knock};
 use super::wire::{self, Request};
 use super::{Context, CurveKey, Endpoint, EndpointError, z85};
-use crate::actors::{Ask, Hello, Quota, QuotaExceeded, Response, Waited};
-use crate::ids::{PublicKey, RequestId, Seq, UserId};
+use crate::actors::{
+    Ask, ErasedView, Hello, Ordered, Quota, QuotaExceeded, Response, TenantAsk, TenantVerb,
+    TenantView, Waited,
+};
+use crate::ids::{PublicKey, RequestId, Seq, TenantId, UserId};
 use crate::limits::{CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, WAIT_S_MAX};
 use crate::session::{Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status};
+use crate::tenancy::Order;
 use crate::world::{Stage, View};
 
 /// One person's end of the wire: asks, waits, and asks again with the same request id, which is
@@ -229,6 +233,33 @@ impl Client {
         }
     }
 
+    /// Gives an operator's order.
+    ///
+    /// - `tenant`: whom it is about; none: the tenant of this client's own key.
+    pub fn order(&self, tenant: Option<TenantId>, order: Order) -> Result<Ordered, ClientError> {
+        match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::Give(order) }))? {
+            Response::Ordered(ordered) => Ok(ordered),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    /// The tenants that this operator may see, or one of them.
+    pub fn tenants(&self, tenant: Option<TenantId>) -> Result<Vec<TenantView>, ClientError> {
+        match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::List }))? {
+            Response::Tenants(tenants) => Ok(tenants),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    /// Erases a person, for good. Under a fresh request id: after an answer was lost, look whether
+    /// the name is in use again before asking anew, or its new bearer would be erased.
+    pub fn erase(&self, tenant: Option<TenantId>, user: UserId) -> Result<ErasedView, ClientError> {
+        match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::Erase { user } }))? {
+            Response::Erased(erased) => Ok(erased),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
     /// Waits until the training that runs is over, if one does.
     ///
     /// - errors: [`ClientError::NoAnswer`] when it is not over within `limit`.
@@ -436,6 +467,9 @@ impl Client {
             Response::Known(_) => "exemplars",
             Response::Waited(_) => "the end of a wait",
             Response::Hello(_) => "a hello",
+            Response::Ordered(_) => "the end of an order",
+            Response::Tenants(_) => "tenants",
+            Response::Erased(_) => "an erasure",
             Response::Rejected(_)
             | Response::Busy(_)
             | Response::QuotaExceeded(_)

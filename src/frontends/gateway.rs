@@ -6,15 +6,18 @@ use std::time::{Duration, Instant};
 
 use super::counters::{Counters, count};
 use super::door::{Door, Incoming, Keyed, Sender};
+use super::erasures::{Asked, Erasures};
 use super::outbox::{Inbox, Outbox};
 use super::rights::{self, Caller};
 use super::wire::{self, Refused};
 use super::zap::{Doorkeeper, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
-use crate::actors::{AnswerTo, ErrorCode, Failed, Failure, Front, NotTaken, Response, Submit};
-use crate::ids::RequestId;
+use crate::actors::{
+    AnswerTo, Ask, ErasedView, ErrorCode, Failed, Failure, Front, NotTaken, Ordered, Registrar,
+    Response, Submit, TenantAsk, TenantVerb, TenantView,
+};
+use crate::ids::{RequestId, TenantId, UserId};
 use crate::sabotage;
-use crate::tenancy::Admissions;
 
 /// The doors: one thread that owns their ROUTERs and polls them together with the outbox of the
 /// actors.
@@ -46,7 +49,6 @@ pub struct Doors<'a> {
 pub struct LockedDoor<'a> {
     pub endpoints: &'a [Endpoint],
     pub key: &'a CurveKey,
-    pub admissions: Admissions,
 }
 
 /// Why the gateway did not open.
@@ -94,6 +96,7 @@ impl Gateway {
         context: &Context,
         doors: Doors<'_>,
         front: Front,
+        registrar: Registrar,
         failure: Failure,
     ) -> Result<Gateway, GatewayError> {
         let start = |reason: String| GatewayError::Start { reason };
@@ -105,9 +108,10 @@ impl Gateway {
         let mut locked = Vec::new();
         let mut routers = vec![door];
         let mut doorkeeper = None;
-        if let Some(LockedDoor { endpoints, key, admissions }) = doors.locked {
+        if let Some(LockedDoor { endpoints, key }) = doors.locked {
             lock::check(zmq::has("curve"))?;
             let (seal, wake) = (Seal::fresh(), outbox.clone());
+            let admissions = registrar.admissions().clone();
             let keeper = Doorkeeper::start(
                 context,
                 seal.clone(),
@@ -125,6 +129,8 @@ impl Gateway {
         let hall = Hall {
             doors: routers,
             front,
+            registrar,
+            erasures: Erasures::new(),
             failure: failure.clone(),
             counters: counters.clone(),
             stopping: stopping.clone(),
@@ -188,6 +194,8 @@ impl Drop for Gateway {
 struct Hall {
     doors: Vec<Door>,
     front: Front,
+    registrar: Registrar,
+    erasures: Erasures<ErasedView>,
     failure: Failure,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
@@ -318,14 +326,11 @@ impl Hall {
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
         }
-        self.in_flight.fetch_add(1, Ordering::SeqCst);
-        let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
-        let answer = AnswerTo::new(move |response| {
-            // Encoded here, by the actor's thread: the gateway's only carries.
-            let bytes = wire::encode_response(id, response);
-            outbox.put(Outgoing { peer, bytes });
-            in_flight.fetch_sub(1, Ordering::SeqCst);
-        });
+        let answer = self.answer_to(peer, id);
+        let ask = match ask {
+            Ask::Order(order) => return self.order(&caller, order, id, answer),
+            ask => ask,
+        };
         let submit = Submit { tenant: caller.tenant(), user, request: id, ask, answer };
         match self.front.submit(submit) {
             Ok(()) => {}
@@ -348,6 +353,72 @@ impl Hall {
                 submit.answer.send(Response::error(ErrorCode::Unavailable, gone));
             }
         }
+    }
+
+    /// The way back for an answer that is not here yet.
+    fn answer_to(&self, peer: Peer, id: RequestId) -> AnswerTo {
+        self.in_flight.fetch_add(1, Ordering::SeqCst);
+        let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
+        AnswerTo::new(move |response| {
+            // Encoded here, by the actor's thread: the gateway's only carries.
+            let bytes = wire::encode_response(id, response);
+            outbox.put(Outgoing { peer, bytes });
+            in_flight.fetch_sub(1, Ordering::SeqCst);
+        })
+    }
+
+    /// Carries out an order of somebody who may give it.
+    fn order(
+        &self,
+        caller: &Caller,
+        TenantAsk { tenant, verb }: TenantAsk,
+        id: RequestId,
+        answer: AnswerTo,
+    ) {
+        match verb {
+            TenantVerb::List => {
+                let only = if caller.is_host() { tenant } else { Some(caller.tenant()) };
+                let tenants = TenantView::list(self.registrar.admissions(), only.as_ref());
+                answer.send(Response::Tenants(tenants));
+            }
+            TenantVerb::Erase { user } => {
+                self.erase(tenant.unwrap_or_else(|| caller.tenant()), user, id, answer);
+            }
+            TenantVerb::Give(order) => {
+                let tenant = tenant.unwrap_or_else(|| caller.tenant());
+                self.registrar.order(tenant.clone(), order, move |obeyed| {
+                    answer.send(match obeyed {
+                        Ok(events) => {
+                            Response::Ordered(Ordered { tenant, recorded: events.len() as u32 })
+                        }
+                        Err(error) => error.into(),
+                    });
+                });
+            }
+        }
+    }
+
+    fn erase(&self, tenant: TenantId, user: UserId, id: RequestId, answer: AnswerTo) {
+        match self.erasures.ask(&tenant, id) {
+            Asked::First => {}
+            Asked::UnderWay => {
+                let under_way = "this person is being erased; ask again in a moment";
+                return answer.send(Response::busy(under_way, RETRY_FULL_MS));
+            }
+            Asked::Done(view) => return answer.send(Response::Erased(view)),
+        }
+        let erasures = self.erasures.clone();
+        self.front.erase(tenant.clone(), user, move |erased| {
+            let (view, response) = match erased {
+                Ok(erased) => {
+                    let view = ErasedView { tenant: tenant.clone(), erased };
+                    (Some(view.clone()), Response::Erased(view))
+                }
+                Err(error) => (None, error.into()),
+            };
+            erasures.end(&tenant, id, view);
+            answer.send(response);
+        });
     }
 
     fn deny(&self, peer: Peer, id: RequestId, failed: Failed) {

@@ -1,8 +1,8 @@
 //! Who may ask what. The table stands in `schema/wire.md` too.
 
-use crate::actors::{Ask, ErrorCode, Failed};
+use crate::actors::{Ask, ErrorCode, Failed, TenantAsk, TenantVerb};
 use crate::ids::TenantId;
-use crate::tenancy::{Admitted, Role};
+use crate::tenancy::{Admitted, Order, Role};
 
 /// Who a message is from, as its door vouches: nothing in the message has a say in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,25 +21,46 @@ impl Caller {
         }
     }
 
-    fn has(&self, roles: &[Role]) -> bool {
-        match self {
-            Caller::Local => true,
-            Caller::Keyed(admitted) => roles.contains(&admitted.role),
+    /// - errors: the role that is needed, when the caller's is another one; an order about more
+    ///   than the caller's own.
+    pub fn may(&self, ask: &Ask) -> Result<(), Failed> {
+        let Caller::Keyed(Admitted { role: held, .. }) = self else { return Ok(()) };
+        let needed = roles_for(ask);
+        if !needed.contains(held) {
+            let needed: Vec<&str> = needed.iter().map(|role| role.name()).collect();
+            let needed = needed.join(" or ");
+            let message = format!("this needs a key with the role {needed}; yours is {held}");
+            return Err(denied(message));
+        }
+        match ask {
+            Ask::Order(order) => self.may_order(order),
+            _ => Ok(()),
         }
     }
 
-    /// - errors: the role that is needed, when the caller's is another one.
-    pub fn may(&self, ask: &Ask) -> Result<(), Failed> {
-        let needed = roles_for(ask);
-        match self {
-            Caller::Keyed(admitted) if !self.has(needed) => {
-                let needed: Vec<&str> = needed.iter().map(|role| role.name()).collect();
-                let needed = needed.join(" or ");
-                let held = admitted.role;
-                let message = format!("this needs a key with the role {needed}; yours is {held}");
-                Err(denied(message))
+    /// The operators of the whole host are those of tenant `local`; another tenant's decide about
+    /// its keys, erase its people and see its quotas. They do not set them: quotas protect the others from it.
+    pub fn is_host(&self) -> bool {
+        self.tenant() == TenantId::local()
+    }
+
+    fn may_order(&self, TenantAsk { tenant, verb }: &TenantAsk) -> Result<(), Failed> {
+        if self.is_host() {
+            return Ok(());
+        }
+        if tenant.as_ref().is_some_and(|tenant| *tenant != self.tenant()) {
+            let host = "an order about another tenant needs an operator's key of tenant local";
+            return Err(denied(host.to_owned()));
+        }
+        match verb {
+            TenantVerb::List
+            | TenantVerb::Erase { .. }
+            | TenantVerb::Give(Order::Admit { .. } | Order::Retire { .. } | Order::Rotate { .. }) => {
+                Ok(())
             }
-            _ => Ok(()),
+            TenantVerb::Give(_) => {
+                Err(denied("this order needs an operator's key of tenant local".to_owned()))
+            }
         }
     }
 }
@@ -67,13 +88,16 @@ fn roles_for(ask: &Ask) -> &'static [Role] {
         Ask::Hello => &[Role::Gateway, Role::Operator, Role::Auditor],
         Ask::Query(_) | Ask::Wait { .. } => &[Role::Gateway, Role::Operator],
         Ask::Command(_) => &[Role::Gateway],
+        Ask::Order(_) => &[Role::Operator],
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::{PublicKey, UserId};
     use crate::session::{Command, Query};
+    use crate::tenancy::Quotas;
 
     #[test]
     fn each_role_may_ask_what_is_its_own_and_is_told_whose_the_rest_is() {
@@ -96,5 +120,46 @@ mod tests {
             failed.message,
             "this needs a key with the role gateway or operator; yours is auditor"
         );
+    }
+    #[test]
+    fn an_operator_decides_about_the_own_tenant_and_the_hosts_about_all() {
+        let [lab, other] = ["lab", "other"].map(|name| TenantId::new(name).unwrap());
+        let operator = |tenant: &TenantId| {
+            Caller::Keyed(Admitted { tenant: tenant.clone(), role: Role::Operator })
+        };
+        let key = PublicKey([1; 32]);
+        let own = [
+            TenantVerb::List,
+            TenantVerb::Erase { user: UserId::new("ada").unwrap() },
+            TenantVerb::Give(Order::Admit { key, role: Role::Auditor, label: String::new() }),
+            TenantVerb::Give(Order::Retire { key, overlap_seconds: 0 }),
+            TenantVerb::Give(Order::Rotate { old: key, new: key, overlap_seconds: 0 }),
+        ];
+        let hosts = [
+            TenantVerb::Give(Order::Open),
+            TenantVerb::Give(Order::Disable { reason: String::new() }),
+            TenantVerb::Give(Order::Enable),
+            TenantVerb::Give(Order::SetQuotas(Quotas::default())),
+        ];
+        let may = |caller: &Caller, tenant: Option<&TenantId>, verb: &TenantVerb| {
+            let ask = TenantAsk { tenant: tenant.cloned(), verb: verb.clone() };
+            caller.may(&Ask::Order(ask)).is_ok()
+        };
+        for (verb, is_own) in own.iter().map(|v| (v, true)).chain(hosts.iter().map(|v| (v, false)))
+        {
+            for tenant in [None, Some(&lab)] {
+                assert_eq!(may(&operator(&lab), tenant, verb), is_own, "{verb:?}");
+            }
+            assert!(!may(&operator(&lab), Some(&other), verb), "{verb:?}");
+            for host in [Caller::Local, operator(&TenantId::local())] {
+                assert!(may(&host, Some(&other), verb), "{verb:?}");
+            }
+            for role in [Role::Gateway, Role::Auditor] {
+                for tenant in [&lab, &TenantId::local()] {
+                    let caller = Caller::Keyed(Admitted { tenant: tenant.clone(), role });
+                    assert!(!may(&caller, Some(tenant), verb), "{verb:?}");
+                }
+            }
+        }
     }
 }

@@ -6,13 +6,17 @@ use std::io::Cursor;
 use serde::de::{DeserializeOwned, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::orders::WireOrder;
 use crate::actors::{
-    Ask, Busy, ErrorCode, Failed, Hello, QuotaExceeded, Rejected, Response, Waited,
+    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, Ordered, QuotaExceeded, Rejected, Response,
+    TenantAsk, TenantView, Waited,
 };
-use crate::ids::{RequestId, UserId};
+use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
 use crate::session::{Command, KnownExemplar, Query, Reply, Status};
 use crate::world::View;
+
+pub use super::orders::ORDERS;
 
 /// What this binary speaks and understands.
 pub const VERSION: u64 = 1;
@@ -60,6 +64,10 @@ struct RequestMap<'a> {
     command: Option<&'a Command>,
     #[serde(skip_serializing_if = "Option::is_none")]
     query: Option<WireQuery>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    order: Option<WireOrder>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tenant: Option<&'a TenantId>,
 }
 
 // A request is read field by field, so that each fault is named and, whatever else is wrong, the
@@ -85,6 +93,8 @@ struct VerbFields {
     command: Option<Verb>,
     #[serde(default)]
     query: Option<Verb>,
+    #[serde(default)]
+    order: Option<Verb>,
 }
 
 #[derive(Deserialize)]
@@ -97,19 +107,38 @@ struct QueryField {
     query: WireQuery,
 }
 
+#[derive(Deserialize)]
+struct OrderFields {
+    order: WireOrder,
+    #[serde(default)]
+    tenant: Option<TenantId>,
+}
+
 /// The request as one MessagePack map.
 ///
-/// - panics: never; requests are plain data.
+/// - panics: never; requests are plain data. An order from inside the service is no request, and
+///   leaves its verb out.
 pub fn encode_request(request: &Request) -> Vec<u8> {
-    let (command, query) = match &request.ask {
-        Ask::Command(command) => (Some(command), None),
-        Ask::Query(Query::Look) => (None, Some(WireQuery::Look)),
-        Ask::Query(Query::Known) => (None, Some(WireQuery::Known)),
-        Ask::Query(Query::Status) => (None, Some(WireQuery::Status)),
-        Ask::Wait { seconds } => (None, Some(WireQuery::Wait { seconds: *seconds })),
-        Ask::Hello => (None, Some(WireQuery::Hello)),
+    let mut map = RequestMap {
+        v: VERSION,
+        id: request.id,
+        user: &request.user,
+        command: None,
+        query: None,
+        order: None,
+        tenant: None,
     };
-    let map = RequestMap { v: VERSION, id: request.id, user: &request.user, command, query };
+    match &request.ask {
+        Ask::Command(command) => map.command = Some(command),
+        Ask::Query(Query::Look) => map.query = Some(WireQuery::Look),
+        Ask::Query(Query::Known) => map.query = Some(WireQuery::Known),
+        Ask::Query(Query::Status) => map.query = Some(WireQuery::Status),
+        Ask::Wait { seconds } => map.query = Some(WireQuery::Wait { seconds: *seconds }),
+        Ask::Hello => map.query = Some(WireQuery::Hello),
+        Ask::Order(TenantAsk { tenant, verb }) => {
+            (map.order, map.tenant) = (WireOrder::of(verb), tenant.as_ref());
+        }
+    }
     pack(&map)
 }
 
@@ -142,14 +171,14 @@ pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
     }
     let user = unpack::<UserField>(bytes).map_err(|reason| malformed("user", reason))?.user;
     let verbs = unpack::<VerbFields>(bytes).map_err(|reason| malformed("verb", reason))?;
-    let ask = match (verbs.command, verbs.query) {
-        (Some(Verb(verb)), None) => {
+    let ask = match (verbs.command, verbs.query, verbs.order) {
+        (Some(Verb(verb)), None, None) => {
             check_command(&verb).map_err(|(code, message)| refuse(code, message))?;
             let command = unpack::<CommandField>(bytes)
                 .map_err(|reason| malformed(&format!("command {verb:?}"), reason))?;
             Ask::Command(command.command)
         }
-        (None, Some(Verb(verb))) => {
+        (None, Some(Verb(verb)), None) => {
             check_query(&verb).map_err(|message| refuse(ErrorCode::UnknownVerb, message))?;
             let query = unpack::<QueryField>(bytes)
                 .map_err(|reason| malformed(&format!("query {verb:?}"), reason))?;
@@ -161,13 +190,19 @@ pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
                 WireQuery::Hello => Ask::Hello,
             }
         }
-        (Some(_), Some(_)) => {
-            let message = "a request has a command or a query, this one has both".to_owned();
-            return Err(refuse(ErrorCode::Malformed, message));
+        (None, None, Some(Verb(verb))) => {
+            check_order(&verb).map_err(|message| refuse(ErrorCode::UnknownVerb, message))?;
+            let OrderFields { order, tenant } = unpack::<OrderFields>(bytes)
+                .map_err(|reason| malformed(&format!("order {verb:?}"), reason))?;
+            Ask::Order(TenantAsk { tenant, verb: order.verb() })
         }
-        (None, None) => {
-            let message = "a request has a command or a query, this one has neither".to_owned();
-            return Err(refuse(ErrorCode::Malformed, message));
+        (None, None, None) => {
+            let message = "a request has a command, a query or an order; this one has neither";
+            return Err(refuse(ErrorCode::Malformed, message.to_owned()));
+        }
+        _ => {
+            let message = "a request has one of command, query and order; this one has both";
+            return Err(refuse(ErrorCode::Malformed, message.to_owned()));
         }
     };
     Ok(Request { id: checked_id, user, ask })
@@ -197,6 +232,16 @@ fn check_query(verb: &str) -> Result<(), String> {
     }
 }
 
+fn check_order(verb: &str) -> Result<(), String> {
+    match ORDERS.contains(&verb) {
+        true => Ok(()),
+        false => {
+            let known = ORDERS.join(", ");
+            Err(format!("unknown order {:?}; the orders are {known}", shorten(verb)))
+        }
+    }
+}
+
 fn shorten(text: &str) -> String {
     text.chars().take(40).collect()
 }
@@ -221,6 +266,12 @@ struct ResponseMap {
     #[serde(skip_serializing_if = "Option::is_none")]
     hello: Option<Hello>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    ordered: Option<Ordered>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tenants: Option<Vec<TenantView>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    erased: Option<ErasedView>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     rejected: Option<Rejected>,
     #[serde(skip_serializing_if = "Option::is_none")]
     busy: Option<Busy>,
@@ -242,6 +293,9 @@ pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
         Response::Known(known) => map.known = Some(known),
         Response::Waited(waited) => map.waited = Some(waited),
         Response::Hello(hello) => map.hello = Some(hello),
+        Response::Ordered(ordered) => map.ordered = Some(ordered),
+        Response::Tenants(tenants) => map.tenants = Some(tenants),
+        Response::Erased(erased) => map.erased = Some(erased),
         Response::Rejected(rejected) => map.rejected = Some(rejected),
         Response::Busy(busy) => map.busy = Some(busy),
         Response::QuotaExceeded(over) => map.quota_exceeded = Some(over),
@@ -266,6 +320,9 @@ pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
         map.known.map(Response::Known),
         map.waited.map(Response::Waited),
         map.hello.map(Response::Hello),
+        map.ordered.map(Response::Ordered),
+        map.tenants.map(Response::Tenants),
+        map.erased.map(Response::Erased),
         map.rejected.map(Response::Rejected),
         map.busy.map(Response::Busy),
         map.quota_exceeded.map(Response::QuotaExceeded),

@@ -145,10 +145,10 @@ impl Service {
             failure: failure.clone(),
         })?;
         let context = Context::new();
-        let admissions = house.registrar().admissions().clone();
-        let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key, admissions });
+        let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key });
         let doors = Doors { inner: INNER, open: &open, locked };
-        let gateway = Gateway::open(&context, doors, house.front(), failure.clone())?;
+        let (front, registrar) = (house.front(), house.registrar().clone());
+        let gateway = Gateway::open(&context, doors, front, registrar, failure.clone())?;
         let server_key = key.map(|key| *key.public());
         Ok(Service { gateway, house, context, failure, server_key })
     }

@@ -2,7 +2,7 @@
 
 mod show;
 
-pub use show::{json, readable};
+pub use show::{json, readable, utc};
 
 use std::io::Write;
 

@@ -112,7 +112,7 @@ fn tenants(event: &TenantEvent) -> String {
 }
 
 /// `2026-01-31 12:00:00Z`.
-fn utc(at: Timestamp) -> String {
+pub fn utc(at: Timestamp) -> String {
     let seconds = at.0 / 1_000_000;
     let (days, second) = (seconds / 86_400, seconds % 86_400);
     let (year, month, day) = date(days);

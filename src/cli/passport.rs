@@ -6,30 +6,31 @@ use super::failure::Failure;
 use crate::frontends::{Client, CurveKey, Identity, read_public};
 use crate::ids::UserId;
 
-/// Which service, and as whom.
+/// Who comes, for a service that lets in only those with a key.
 #[derive(Debug, Args)]
-pub struct Whereto {
-    /// Where the service listens.
-    #[arg(long, value_name = "ENDPOINT")]
-    connect: String,
-    /// Your key, as `apprentice keys new` made it, for a service that lets in only those with one.
+pub struct Passport {
+    /// Your key, as `apprentice keys new` made it.
     #[arg(long, value_name = "FILE", requires = "server_key")]
     key: Option<PathBuf>,
-    /// The service's public key: its 40 characters or a file with them.
-    #[arg(long, value_name = "KEY|FILE", requires = "key")]
+    /// The service's public key: its 40 characters, or a file with them.
+    #[arg(long, value_name = "PUBLIC|FILE", requires = "key", allow_hyphen_values = true)]
     server_key: Option<String>,
 }
 
-impl Whereto {
+impl Passport {
+    pub fn is_given(&self) -> bool {
+        self.key.is_some() || self.server_key.is_some()
+    }
+
     /// - errors: with code 2, when an argument cannot be used. Nobody was spoken to yet.
-    pub fn client(&self, user: UserId) -> Result<Client, Failure> {
+    pub fn client(&self, endpoint: &str, user: UserId) -> Result<Client, Failure> {
         let client = match (&self.key, &self.server_key) {
             (Some(key), Some(server)) => {
                 let key = CurveKey::read(key).map_err(Failure::bad_input)?;
                 let server = read_public(server).map_err(Failure::bad_input)?;
-                Client::connect_as(&self.connect, user, Identity { key, server })
+                Client::connect_as(endpoint, user, Identity { key, server })
             }
-            _ => Client::connect(&self.connect, user),
+            _ => Client::connect(endpoint, user),
         };
         client.map_err(Failure::bad_input)
     }

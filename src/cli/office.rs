@@ -1,0 +1,109 @@
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::failure::Failure;
+use super::passport::Passport;
+use super::{data_dir, embedded};
+use crate::actors::{Book, ErrorCode, OrderError, TenantView};
+use crate::events::PersonErased;
+use crate::frontends::{Client, ClientError};
+use crate::ids::{TenantId, UserId};
+use crate::store;
+use crate::tenancy::Order;
+
+/// How long a service may take to carry out an order.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Where tenants are decided about.
+#[derive(Debug, Args)]
+pub struct Place {
+    /// A running service.
+    #[arg(long, value_name = "ENDPOINT", conflicts_with = "data")]
+    connect: Option<String>,
+    #[command(flatten)]
+    passport: Passport,
+    /// A data directory that no service has open
+    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["key", "server_key"])]
+    data: Option<PathBuf>,
+}
+
+/// Who carries orders out. Both are the same [`Book`]; one of them is behind a service's registrar.
+pub enum Office {
+    Running(Client),
+    Closed(Box<Book>),
+}
+
+impl Place {
+    /// - `make`: a data directory that is not there is made.
+    pub fn enter(&self, make: bool) -> Result<Office, Failure> {
+        if let Some(endpoint) = &self.connect {
+            let client = self.passport.client(endpoint, embedded::user("operator")?)?;
+            return Ok(Office::Running(client.with_patience(PATIENCE)));
+        }
+        if self.passport.is_given() {
+            return Err(Failure::bad_input(
+                "--key is for a running service; name it with --connect",
+            ));
+        }
+        let directory = data_dir::choose(self.data.clone())?;
+        if !make {
+            data_dir::must_hold_data(&directory)?;
+        }
+        let store = store::open(&directory).map_err(|error| match error {
+            store::OpenError::InUse { .. } => Failure::bad_input(format!(
+                "{error}; a running service takes orders with --connect"
+            )),
+            error => Failure::bad_input(error),
+        })?;
+        let book = Book::open(store).map_err(Failure::failed)?;
+        Ok(Office::Closed(Box::new(book)))
+    }
+}
+
+impl Office {
+    /// - returns: how many records it led to; 0 when it was so already.
+    pub fn obey(&mut self, tenant: &TenantId, order: Order) -> Result<u32, Failure> {
+        match self {
+            Office::Running(client) => {
+                let ordered = client.order(Some(tenant.clone()), order).map_err(Failure::failed)?;
+                Ok(ordered.recorded)
+            }
+            Office::Closed(book) => {
+                let events = book.obey(tenant, &order).map_err(Failure::failed)?;
+                Ok(events.len() as u32)
+            }
+        }
+    }
+
+    /// - errors: with code 2, when there is no such person.
+    pub fn erase(&mut self, tenant: &TenantId, user: &UserId) -> Result<PersonErased, Failure> {
+        match self {
+            Office::Running(client) => {
+                let erased = client.erase(Some(tenant.clone()), user.clone());
+                erased.map(|view| view.erased).map_err(|error| match error {
+                    ClientError::Failed { code: ErrorCode::Refused, .. } => {
+                        Failure::bad_input(error)
+                    }
+                    error => Failure::failed(error),
+                })
+            }
+            Office::Closed(book) => {
+                let stream = book.stream_id(tenant, user).map_err(Failure::bad_input)?;
+                book.erase(&stream).map_err(|error| match error {
+                    OrderError::NobodyThere { .. } => Failure::bad_input(error),
+                    error => Failure::failed(error),
+                })
+            }
+        }
+    }
+
+    pub fn list(&mut self, only: Option<&TenantId>) -> Result<Vec<TenantView>, Failure> {
+        match self {
+            Office::Running(client) => client.tenants(only.cloned()).map_err(Failure::failed),
+            Office::Closed(book) => Ok(TenantView::list(book.admissions(), only)),
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Orders about tenants, to a running service or a closed data directory.
+
+use clap::{Args, Subcommand};
+
+use super::failure::Failure;
+use super::log::utc;
+use super::office::{Office, Place};
+use super::overlap;
+use crate::actors::TenantView;
+use crate::frontends::{read_public, show_key};
+use crate::ids::{PublicKey, TenantId};
+use crate::tenancy::{Order, Quotas, Role};
+
+/// Say which labs are served, with which keys, and how much of the machine each may take.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples, before the service first starts and while it runs:
+  apprentice tenant add lab-a --data labs
+  apprentice tenant admit lab-a a.key.pub --role gateway --label 'robot in room 7' --data labs
+  apprentice tenant list --connect ipc:///run/apprentice/operator
+  apprentice tenant rotate-key lab-a a.key.pub new.key.pub --overlap 7d \\
+      --connect tcp://robot.example:7117 --key operator.key --server-key server.pub
+  apprentice tenant quotas lab-a --utterances-per-second 20 --connect ipc:///run/apprentice/operator
+
+Whoever comes through a door without keys, and operators of tenant `local`, may do all of it; an operator
+of another tenant may list it and admit, retire and rotate its keys. An order that was carried out already
+is carried out again without harm.
+
+Exit codes: 0 done, 1 refused or no answer, 2 an argument or a directory that cannot be used.")]
+pub struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// A new tenant, with a secret of its own.
+    Add {
+        tenant: String,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Tenants with their keys and quotas.
+    List {
+        /// Only this one.
+        tenant: Option<String>,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Shut a tenant out: its open connections are denied at their next message.
+    Disable {
+        tenant: String,
+        /// For operators; clients are not told.
+        #[arg(long, value_name = "TEXT", default_value = "")]
+        reason: String,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Let a disabled tenant in again.
+    Enable {
+        tenant: String,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Let a key in, as this tenant. One key is one tenant's.
+    Admit {
+        tenant: String,
+        /// The public half: its 40 characters, or a file with them.
+        #[arg(value_name = "PUBLIC|FILE", allow_hyphen_values = true)]
+        public: String,
+        /// gateway (people's requests), operator (keys and orders) or auditor (sealed records).
+        #[arg(long, value_name = "ROLE")]
+        role: Role,
+        /// For operators: where this key is.
+        #[arg(long, value_name = "TEXT", default_value = "")]
+        label: String,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Take a key back. It never comes in again.
+    Retire {
+        tenant: String,
+        #[arg(value_name = "PUBLIC|FILE", allow_hyphen_values = true)]
+        public: String,
+        /// It stays good for so long: 90s, 15m, 12h, 7d.
+        #[arg(long, value_name = "TIME", default_value = "0s", value_parser = overlap::parse)]
+        overlap: u64,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Let a new key in, in an old one's role, and retire the old one after a while.
+    RotateKey {
+        tenant: String,
+        #[arg(value_name = "OLD|FILE", allow_hyphen_values = true)]
+        old: String,
+        #[arg(value_name = "NEW|FILE", allow_hyphen_values = true)]
+        new: String,
+        /// Both are good for so long: 90s, 15m, 12h, 7d.
+        #[arg(long, value_name = "TIME", value_parser = overlap::parse)]
+        overlap: u64,
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Show what a tenant may take, or set it: what is not named then has no limit but the machine's.
+    Quotas {
+        tenant: String,
+        #[command(flatten)]
+        limits: Limits,
+        #[command(flatten)]
+        place: Place,
+    },
+}
+
+/// None of them given: the quotas are shown.
+#[derive(Debug, Args)]
+struct Limits {
+    /// People awake at once.
+    #[arg(long, value_name = "N")]
+    awake_users: Option<u32>,
+    /// Requests taken and not yet answered.
+    #[arg(long, value_name = "N")]
+    in_flight: Option<u32>,
+    /// Utterances a second, in the long run.
+    #[arg(long, value_name = "N")]
+    utterances_per_second: Option<u32>,
+    /// Utterances at once after a silence.
+    #[arg(long, value_name = "N")]
+    burst: Option<u32>,
+    /// Sealed bytes in the log, all in all.
+    #[arg(long, value_name = "BYTES")]
+    sealed_bytes: Option<u64>,
+    /// Trainings waiting.
+    #[arg(long, value_name = "N")]
+    trainings_waiting: Option<u32>,
+    /// Take all limits away.
+    #[arg(long, conflicts_with_all = [
+        "awake_users", "in_flight", "utterances_per_second", "burst", "sealed_bytes",
+        "trainings_waiting",
+    ])]
+    none: bool,
+}
+
+impl Limits {
+    /// - returns: none, when they are only to be shown.
+    fn wanted(&self) -> Option<Quotas> {
+        let quotas = Quotas {
+            awake_users: self.awake_users,
+            in_flight: self.in_flight,
+            utterances_per_second: self.utterances_per_second,
+            burst: self.burst,
+            sealed_bytes: self.sealed_bytes,
+            trainings_waiting: self.trainings_waiting,
+        };
+        (self.none || quotas != Quotas::default()).then_some(quotas)
+    }
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let (tenant, place, order) = match arguments.verb {
+        Verb::List { tenant, place } => {
+            let tenant = tenant.as_deref().map(name).transpose()?;
+            return list(&mut place.enter(false)?, tenant);
+        }
+        Verb::Quotas { tenant, limits, place } => match limits.wanted() {
+            None => return show_quotas(&mut place.enter(false)?, name(&tenant)?),
+            Some(quotas) => (tenant, place, Order::SetQuotas(quotas)),
+        },
+        Verb::Add { tenant, place } => (tenant, place, Order::Open),
+        Verb::Disable { tenant, reason, place } => (tenant, place, Order::Disable { reason }),
+        Verb::Enable { tenant, place } => (tenant, place, Order::Enable),
+        Verb::Admit { tenant, public, role, label, place } => {
+            (tenant, place, Order::Admit { key: key(&public)?, role, label })
+        }
+        Verb::Retire { tenant, public, overlap, place } => {
+            let order = Order::Retire { key: key(&public)?, overlap_seconds: overlap };
+            (tenant, place, order)
+        }
+        Verb::RotateKey { tenant, old, new, overlap, place } => {
+            let (old, new) = (key(&old)?, key(&new)?);
+            (tenant, place, Order::Rotate { old, new, overlap_seconds: overlap })
+        }
+    };
+    let tenant = name(&tenant)?;
+    let recorded = place.enter(order == Order::Open)?.obey(&tenant, order)?;
+    match recorded {
+        0 => println!("tenant {tenant}: it was so already"),
+        _ => println!("tenant {tenant}: done"),
+    }
+    Ok(())
+}
+
+fn name(text: &str) -> Result<TenantId, Failure> {
+    TenantId::new(text).map_err(Failure::bad_input)
+}
+
+fn key(text: &str) -> Result<PublicKey, Failure> {
+    read_public(text).map_err(Failure::bad_input)
+}
+
+fn list(office: &mut Office, only: Option<TenantId>) -> Result<(), Failure> {
+    let tenants = office.list(only.as_ref())?;
+    match (&only, tenants.is_empty()) {
+        (Some(tenant), true) => return Err(absent(tenant)),
+        (None, true) => eprintln!("apprentice: no tenant yet; `apprentice tenant add` makes one"),
+        (_, false) => {}
+    }
+    tenants.iter().for_each(show);
+    Ok(())
+}
+
+fn absent(tenant: &TenantId) -> Failure {
+    Failure::failed(format!("there is no tenant {tenant}; `apprentice tenant list` shows them all"))
+}
+
+fn show(view: &TenantView) {
+    let TenantView { tenant, disabled, quotas, keys } = view;
+    match disabled {
+        None => println!("{tenant}: {quotas}"),
+        Some(reason) => println!("{tenant}: DISABLED ({reason:?}); {quotas}"),
+    }
+    for known in keys {
+        let until = match known.valid_until {
+            None => String::new(),
+            Some(until) => format!(" until {}", utc(until)),
+        };
+        let (key, role, label) = (show_key(&known.key), known.role, &known.label);
+        println!("  {role:<8}  {key}  since {}{until}  {label:?}", utc(known.admitted_at));
+    }
+}
+
+fn show_quotas(office: &mut Office, tenant: TenantId) -> Result<(), Failure> {
+    match office.list(Some(&tenant))?.first() {
+        Some(view) => println!("{tenant}: {}", view.quotas),
+        None => return Err(absent(&tenant)),
+    }
+    Ok(())
+}

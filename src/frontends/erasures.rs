@@ -1,0 +1,109 @@
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::ids::{RequestId, TenantId};
+
+/// Erasures of late, by the requests that asked for them. A name that was erased stands for
+/// somebody new as soon as it is used again, so a request that is sent once more, because its answer
+/// was lost, must not erase that one too.
+///
+/// - `V`: what is answered.
+#[derive(Debug)]
+pub(super) struct Erasures<V>(Arc<Mutex<Inner<V>>>);
+
+#[derive(Debug)]
+struct Inner<V> {
+    asked: BTreeMap<(TenantId, RequestId), Option<V>>,
+    order: VecDeque<(TenantId, RequestId)>,
+}
+
+/// What is to be done about a request.
+#[derive(Debug, PartialEq)]
+pub(super) enum Asked<V> {
+    /// It is new.
+    First,
+    UnderWay,
+    Done(V),
+}
+
+/// Far more than are asked for while a client retries.
+const REMEMBERED_MAX: usize = 4_096;
+
+impl<V> Clone for Erasures<V> {
+    fn clone(&self) -> Self {
+        Erasures(self.0.clone())
+    }
+}
+
+impl<V: Clone> Erasures<V> {
+    pub fn new() -> Erasures<V> {
+        let (asked, order) = (BTreeMap::new(), VecDeque::new());
+        Erasures(Arc::new(Mutex::new(Inner { asked, order })))
+    }
+
+    pub fn ask(&self, tenant: &TenantId, id: RequestId) -> Asked<V> {
+        let mut inner = self.lock();
+        let name = (tenant.clone(), id);
+        match inner.asked.get(&name) {
+            Some(None) => return Asked::UnderWay,
+            Some(Some(view)) => return Asked::Done(view.clone()),
+            None => {}
+        }
+        if inner.order.len() >= REMEMBERED_MAX
+            && let Some(oldest) = inner.order.pop_front()
+        {
+            inner.asked.remove(&oldest);
+        }
+        inner.order.push_back(name.clone());
+        inner.asked.insert(name, None);
+        Asked::First
+    }
+
+    /// - `view`: none when it went wrong: the request may be tried again.
+    pub fn end(&self, tenant: &TenantId, id: RequestId, view: Option<V>) {
+        let mut inner = self.lock();
+        let name = (tenant.clone(), id);
+        match view {
+            Some(view) => {
+                // Unless so many came after it that it was forgotten.
+                if let Some(known) = inner.asked.get_mut(&name) {
+                    *known = Some(view);
+                }
+            }
+            None => {
+                inner.asked.remove(&name);
+                inner.order.retain(|known| *known != name);
+            }
+        }
+    }
+
+    // Two collections that a panic cannot leave in half: each change is one call.
+    fn lock(&self) -> MutexGuard<'_, Inner<V>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_erases_once_however_often_it_is_sent() {
+        let (erasures, lab) = (Erasures::new(), TenantId::new("lab").unwrap());
+        let id = RequestId([1; 16]);
+        assert_eq!(erasures.ask(&lab, id), Asked::First);
+        assert_eq!(erasures.ask(&lab, id), Asked::UnderWay);
+        assert_eq!(erasures.ask(&TenantId::local(), id), Asked::First, "another lab's request");
+        erasures.end(&lab, id, None);
+        assert_eq!(erasures.ask(&lab, id), Asked::First, "it went wrong and is tried again");
+        erasures.end(&lab, id, Some("erased"));
+        assert_eq!(erasures.ask(&lab, id), Asked::Done("erased"));
+        for number in 0..2 * REMEMBERED_MAX as u64 {
+            let mut bytes = [2; 16];
+            bytes[..8].copy_from_slice(&number.to_be_bytes());
+            erasures.ask(&lab, RequestId(bytes));
+        }
+        let inner = erasures.lock();
+        assert_eq!((inner.asked.len(), inner.order.len()), (REMEMBERED_MAX, REMEMBERED_MAX));
+    }
+}
