@@ -6,6 +6,7 @@
 //! [`frontends`] carry. `ARCHITECTURE.md` is the map; its two tables are checked by
 //! `tests/tidy.rs`. Rooms below stand in storeys: imports point upwards on this list only.
 
+pub mod fairness;
 pub mod ids;
 pub mod invariants;
 pub mod limits;

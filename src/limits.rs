@@ -87,16 +87,17 @@ pub const WAIT_S_MAX: u32 = 30;
 pub const AWAKE_USERS_MAX: usize = 10_000;
 /// Minds kept in memory, over all tenants; a mind has some hundred kilobytes.
 pub const MINDS_IN_MEMORY_MAX: usize = 512;
-/// Trainings waiting for a trainer.
+/// Trainings of one tenant that wait for a trainer, at most one for each person.
 pub const TRAIN_QUEUE_MAX: usize = 1_024;
 /// Bytes of one wire frame.
 pub const FRAME_BYTES_MAX: usize = 512 * 1024;
 /// Frames of one wire message, the envelope included.
 pub const FRAMES_MAX: usize = 4;
-/// Requests the gateway has handed to actors and not yet answered.
+/// Requests of one tenant alone that actors have and have not yet answered; several tenants
+/// together have less than twice as many.
 pub const GATEWAY_IN_FLIGHT_MAX: usize = 8_192;
-/// Requests waiting for the directory. It takes whatever the gateway may have in flight.
-pub const DIRECTORY_QUEUE_MAX: usize = GATEWAY_IN_FLIGHT_MAX;
+/// Requests waiting for the directory. It takes whatever all gateways may have in flight.
+pub const DIRECTORY_QUEUE_MAX: usize = 2 * GATEWAY_IN_FLIGHT_MAX;
 /// Nested maps and lists of one wire message; a request needs 4.
 pub const WIRE_DEPTH_MAX: usize = 32;
 

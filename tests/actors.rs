@@ -13,7 +13,7 @@ use apprentice::actors::{
 };
 use apprentice::events::{Batch, Event, SessionClosed};
 use apprentice::frontends::fresh_id;
-use apprentice::ids::{RequestId, TenantId, Timestamp, UserId};
+use apprentice::ids::{RequestId, Seq, TenantId, Timestamp, UserId};
 use apprentice::learning::Recipe;
 use apprentice::service::{Data, Service};
 use apprentice::session::{Command, OnClash, Phase, Query, RejectionCode, Told};
@@ -21,8 +21,8 @@ use apprentice::store::{self, Fault, FaultPlan, FaultyLog, Store};
 use apprentice::world::Stage;
 use toy::Bells;
 
-fn house(store: Store, failure: &Failure) -> House {
-    House::start(HouseSettings {
+fn settings(store: Store, failure: &Failure) -> HouseSettings<Bells> {
+    HouseSettings {
         domain: Arc::new(Bells::new()),
         store,
         recipe_text: Recipe::builtin("tiny").unwrap().to_owned(),
@@ -30,8 +30,11 @@ fn house(store: Store, failure: &Failure) -> House {
         arbiters: 2,
         awake_max: 8,
         failure: failure.clone(),
-    })
-    .unwrap()
+    }
+}
+
+fn house(store: Store, failure: &Failure) -> House {
+    House::start(settings(store, failure)).unwrap()
 }
 
 /// A store in memory whose first appends go wrong as told.
@@ -48,21 +51,31 @@ fn ada() -> UserId {
 
 /// Asks once.
 fn ask(front: &Front, request: RequestId, ask: Ask) -> Response {
+    ask_as(front, (TenantId::local(), ada()), request, ask)
+}
+
+fn ask_as(front: &Front, who: (TenantId, UserId), request: RequestId, ask: Ask) -> Response {
     let (sender, receiver) = mpsc::channel();
     let answer = AnswerTo::new(move |response| sender.send(response).unwrap());
-    let submit = Submit { tenant: TenantId::local(), user: ada(), request, ask, answer };
+    let submit = Submit { tenant: who.0, user: who.1, request, ask, answer };
     match front.submit(submit) {
         Ok(()) => {}
-        Err(NotTaken::Full(_) | NotTaken::Closed(_)) => panic!("the directory takes it"),
+        Err(NotTaken::Full(_) | NotTaken::Over(..) | NotTaken::Closed(_)) => {
+            panic!("the directory takes it")
+        }
     }
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }
 
 /// Asks until it is not busy, as a client does, always with the same id.
 fn insist(front: &Front, command: Command) -> Response {
+    insist_as(front, (TenantId::local(), ada()), command)
+}
+
+fn insist_as(front: &Front, who: (TenantId, UserId), command: Command) -> Response {
     let request = fresh_id();
     loop {
-        match ask(front, request, Ask::Command(command.clone())) {
+        match ask_as(front, who.clone(), request, Ask::Command(command.clone())) {
             Response::Busy(busy) => {
                 std::thread::sleep(Duration::from_millis(u64::from(busy.retry_after_ms)));
             }
@@ -186,4 +199,57 @@ fn whoever_sleeps_goes_on_where_they_were() {
     assert_eq!(status(&house(store.clone(), &Failure::default())), before);
     store.snapshots.forget(&stream).unwrap();
     assert_eq!(status(&house(store, &Failure::default())), before);
+}
+
+/// A person of a lab.
+fn person(lab: &str, number: usize) -> (TenantId, UserId) {
+    (TenantId::new(lab).unwrap(), UserId::new(&format!("person {number}")).unwrap())
+}
+
+/// Plays and teaches until a training is due.
+fn teach(front: &Front, who: &(TenantId, UserId)) {
+    let told = |command: Command| match insist_as(front, who.clone(), command) {
+        Response::Reply(reply) => reply.first,
+        other => panic!("{other:?}"),
+    };
+    told(start());
+    let explains = told(say("sterilize the brass bell"));
+    told(say("ring the brass bell"));
+    told(Command::Done);
+    told(Command::Teach { explains, actions: vec![1], on_clash: OnClash::Ask });
+    told(Command::FinishTeaching);
+}
+
+#[test]
+fn one_labs_flood_of_trainings_delays_anothers_by_the_one_that_runs() {
+    const FLOOD: usize = 20;
+    let (store, failure, gate) = (store::open_memory(), Failure::default(), Arc::default());
+    let house = House::start(HouseSettings {
+        domain: Arc::new(Bells::slow(Arc::clone(&gate))),
+        awake_max: 2 * FLOOD,
+        ..settings(store.clone(), &failure)
+    })
+    .unwrap();
+    let front = house.front();
+    let people: Vec<_> =
+        (0..FLOOD).map(|n| person("flood", n)).chain([person("quiet", 0)]).collect();
+    people.iter().for_each(|who| teach(&front, who));
+    // One training of the flood runs and waits at the gate; the others and the quiet lab's queue.
+    gate.open();
+    let mut ends: Vec<(Timestamp, TenantId)> = people
+        .iter()
+        .map(|who| {
+            let waited = ask_as(&front, who.clone(), fresh_id(), Ask::Wait { seconds: 30 });
+            let Response::Waited(waited) = waited else { panic!("{waited:?}") };
+            assert_eq!(waited.status.phase, Phase::Idle);
+            let stream = store.keys.stream_id(&who.0, &who.1).unwrap();
+            let mut records = store.log.read(&stream, Seq::FIRST).unwrap().map(Result::unwrap);
+            let done = records.find(|r| matches!(r.event, Event::RetrainCompleted(_))).unwrap();
+            (done.at, who.0.clone())
+        })
+        .collect();
+    ends.sort();
+    let place = ends.iter().position(|(_, lab)| lab.as_str() == "quiet").unwrap();
+    // Second in its turn. Actors of other threads may record theirs a moment earlier.
+    assert!(place <= 4, "the quiet lab's training was number {place} of {}", ends.len());
 }

@@ -11,7 +11,8 @@ use apprentice::learning::{Recipe, train};
 use apprentice::replay::{AuditReport, Difference, Scrutiny, audit, keep_mind, streams_of};
 use apprentice::session::Command;
 use apprentice::store::{
-    AppendError, Draft, EventLog, Pending, ReadError, SeededEntropy, Store, Walk, open, open_memory,
+    AppendError, Draft, EventLog, Pending, ReadError, SealedRecords, SeededEntropy, Store, Walk,
+    open, open_memory,
 };
 use support::diary::Diary;
 use support::toy::Bells;
@@ -293,6 +294,10 @@ impl EventLog for Tampered {
         })))
     }
 
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        self.inner.log.sealed(stream, from)
+    }
+
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.inner.log.head(stream)
     }
@@ -307,6 +312,10 @@ impl EventLog for Tampered {
 
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.inner.log.walk(stream)
+    }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.inner.log.sealed_bytes(tenant)
     }
 }
 

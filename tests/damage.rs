@@ -1,5 +1,5 @@
 //! A closed directory with one flipped bit, or cut short: whatever is read afterwards is what was
-//! recorded, or somebody is told. `APPRENTICE_TEST_FLIPS` and `APPRENTICE_TEST_SEED` give another
+//! recorded, or somebody is told. `APPRENTICE_FLIPS` and `APPRENTICE_SEED` give another
 //! number and repeat a run.
 
 use std::collections::BTreeMap;
@@ -64,13 +64,13 @@ fn below(dice: &SeededEntropy, bound: usize) -> usize {
 }
 
 fn seed() -> u64 {
-    let given = std::env::var("APPRENTICE_TEST_SEED").ok().map(|seed| seed.parse().unwrap());
+    let given = std::env::var("APPRENTICE_SEED").ok().map(|seed| seed.parse().unwrap());
     let seed = given.unwrap_or_else(|| {
         let mut bytes = [0; 8];
         OsEntropy.fill(&mut bytes);
         u64::from_be_bytes(bytes)
     });
-    println!("seed: APPRENTICE_TEST_SEED={seed}");
+    println!("seed: APPRENTICE_SEED={seed}");
     seed
 }
 
@@ -322,8 +322,7 @@ fn judge_all(original: Original, wounds: Vec<Wound>) -> BTreeMap<Outcome, usize>
 
 #[test]
 fn a_flipped_bit_is_harmless_or_reported_and_never_served_as_truth() {
-    let flips =
-        std::env::var("APPRENTICE_TEST_FLIPS").map_or(FLIPS, |flips| flips.parse().unwrap());
+    let flips = std::env::var("APPRENTICE_FLIPS").map_or(FLIPS, |flips| flips.parse().unwrap());
     let dice = SeededEntropy::new(seed());
     let original = original();
     let wounds = (0..flips).map(|_| original.wound(&dice, false)).collect();

@@ -24,13 +24,13 @@ use apprentice::world::Stage;
 use support::toy::Bells;
 
 fn dice() -> SeededEntropy {
-    let given = std::env::var("APPRENTICE_TEST_SEED").ok().map(|seed| seed.parse().unwrap());
+    let given = std::env::var("APPRENTICE_SEED").ok().map(|seed| seed.parse().unwrap());
     let seed = given.unwrap_or_else(|| {
         let mut bytes = [0; 8];
         OsEntropy.fill(&mut bytes);
         u64::from_be_bytes(bytes)
     });
-    println!("seed: APPRENTICE_TEST_SEED={seed}");
+    println!("seed: APPRENTICE_SEED={seed}");
     SeededEntropy::new(seed)
 }
 

@@ -20,13 +20,13 @@ struct Dice(SeededEntropy);
 
 impl Dice {
     fn new() -> Dice {
-        let seed = std::env::var("APPRENTICE_TEST_SEED").ok().map(|seed| seed.parse().unwrap());
+        let seed = std::env::var("APPRENTICE_SEED").ok().map(|seed| seed.parse().unwrap());
         let seed = seed.unwrap_or_else(|| {
             let mut bytes = [0; 8];
             OsEntropy.fill(&mut bytes);
             u64::from_be_bytes(bytes)
         });
-        println!("seed: APPRENTICE_TEST_SEED={seed}");
+        println!("seed: APPRENTICE_SEED={seed}");
         Dice(SeededEntropy::new(seed))
     }
 

@@ -276,6 +276,7 @@ fn only_the_store_gives_receipts() {
 #[test]
 fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
     let core = [
+        "fairness",
         "language",
         "numerics",
         "events",

@@ -3,9 +3,10 @@
 //! episodes, taught twice and took one lesson back; bob, with the recipe `paper`, is asked what his
 //! words meant. What `apprentice log show` of that binary printed stands beside it.
 
+#[path = "support/released.rs"]
+mod released;
+
 use std::fs;
-use std::io::Read;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
@@ -19,45 +20,7 @@ use apprentice::service::{Config, Data, Service};
 use apprentice::session::{OnClash, Phase};
 use apprentice::store::{CacheCounts, Store, copy_private, open};
 use apprentice::world::household::Household;
-
-const RELEASE: &str = "released-0.1";
-
-fn golden(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(RELEASE).join(name)
-}
-
-/// The released directory, unpacked.
-fn released() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    let packed = fs::File::open(golden("data.tar.gz")).unwrap();
-    let mut tar = Vec::new();
-    flate2::read::GzDecoder::new(packed).read_to_end(&mut tar).unwrap();
-    unpack(&tar, dir.path());
-    dir
-}
-
-/// Unpacks a ustar archive of directories and small files.
-fn unpack(tar: &[u8], into: &Path) {
-    let text = |bytes: &[u8]| {
-        let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
-        String::from_utf8(bytes[..end].to_vec()).unwrap()
-    };
-    let octal = |bytes: &[u8]| u64::from_str_radix(text(bytes).trim(), 8).unwrap();
-    let mut rest = tar;
-    while rest[0] != 0 {
-        let (header, after) = rest.split_at(512);
-        let path = into.join(text(&header[..100]));
-        let length = octal(&header[124..136]) as usize;
-        match header[156] {
-            b'5' => fs::create_dir_all(&path).unwrap(),
-            b'0' => fs::write(&path, &after[..length]).unwrap(),
-            kind => panic!("{} has kind {kind}", path.display()),
-        }
-        let mode = octal(&header[100..108]) as u32;
-        fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
-        rest = &after[length.div_ceil(512) * 512..];
-    }
-}
+use released::{RELEASE, golden, released};
 
 fn stream(store: &Store, user: &str) -> StreamId {
     store.keys.stream_id(&TenantId::local(), &UserId::new(user).unwrap()).unwrap()

@@ -11,8 +11,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use apprentice::actors::{
-    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, KeyView, Ordered, Rejected, Response,
-    TenantAsk, TenantVerb, TenantView, Waited,
+    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, KeyView, Ordered, Quota, QuotaExceeded,
+    Rejected, Response, TenantAsk, TenantVerb, TenantView, Waited,
 };
 use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::frontends::wire::{
@@ -322,6 +322,28 @@ fn responses() -> Vec<(&'static str, Response)> {
             Response::Busy(Busy {
                 message: "you have too many requests waiting; send it again in a moment".into(),
                 retry_after_ms: 100,
+            }),
+        ),
+        (
+            "quota exceeded",
+            Response::QuotaExceeded(QuotaExceeded {
+                quota: Quota::Utterances,
+                used: 20,
+                limit: 10,
+                retry_after_ms: Some(100),
+                message: "this tenant may say 10 utterances a second".into(),
+            }),
+        ),
+        (
+            "log full",
+            Response::QuotaExceeded(QuotaExceeded {
+                quota: Quota::SealedBytes,
+                used: 1_000_200,
+                limit: 1_000_000,
+                retry_after_ms: None,
+                message: "this tenant has 1000200 bytes in the log, of 1000000 that it may have; \
+                          the operator can allow more"
+                    .into(),
             }),
         ),
         (

@@ -191,13 +191,12 @@ def check(data, key_text, since):
     key = public_key(key_text.strip())
     try:
         found, note = read_proof(data.decode())
-        older = None if since is None else since.decode()
     except UnicodeDecodeError:
         raise Unreadable("it is no text") from None
     size, root = checkpoint(note, key)
     shown = [check_record(found, size, root)] if "record" in found else []
-    if older is not None:
-        old, old_root = checkpoint(older, key)
+    if since is not None:
+        old, old_root = checkpoint(since.decode(errors="replace"), key)
         need(old <= size, "the log was rolled back: %d segments, then %d" % (old, size))
         said = found.get("older") == old
         need(said or old in (0, size), "the file does not say how the log grew")

@@ -3,8 +3,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::life::fresh_request;
 use crate::events::{Batch, Event, Head, PersonErased};
-use crate::evidence;
+use crate::evidence::{self, Checkpoint, Tree};
 use crate::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
+use crate::replay::{self, CheckpointsError, Through};
 use crate::store::{AppendError, KeyError, ReadError, Store};
 use crate::tenancy::{self, Admissions, Disagreement, Order, Refusal, Registry};
 
@@ -32,6 +33,8 @@ pub enum OrderError {
     Read { tenant: TenantId, error: ReadError },
     #[error("tenant {tenant}: {error}; was it recorded by another version of apprentice?")]
     Disagreement { tenant: TenantId, error: Disagreement },
+    #[error("tenant {tenant}: {error}")]
+    Evidence { tenant: TenantId, error: CheckpointsError },
     #[error("tenant {tenant} has no records of such a person: nothing was erased")]
     NobodyThere { tenant: TenantId },
     #[error("they are still busy; nothing was erased; ask again in a moment")]
@@ -53,6 +56,10 @@ impl Book {
         let tenants = tenants.map_err(|error| OrderError::Read { tenant: local, error })?;
         for tenant in tenants {
             let registry = fold(&book.store, &tenant)?;
+            // Going on with a log that is not the one that was signed could never be mended.
+            replay::newest_checkpoint(&book.store, &tenant, &registry)
+                .map_err(|error| OrderError::Evidence { tenant: tenant.clone(), error })?;
+            count_bytes(&book.store, &tenant, &registry);
             book.admissions.update(&tenant, registry.standing());
             book.registries.insert(tenant, registry);
         }
@@ -129,12 +136,72 @@ impl Book {
                 .apply(record)
                 .map_err(|error| OrderError::Disagreement { tenant: tenant.clone(), error })?;
         }
+        count_bytes(&self.store, tenant, registry);
         self.admissions.update(tenant, registry.standing());
         Ok(events)
     }
 }
 
 impl Book {
+    /// Closes the segments of a person's stream that are due. A function of the records; repeating
+    /// it closes nothing more. Blocks.
+    ///
+    /// - returns: how many were closed.
+    pub fn close(&mut self, stream: &StreamId, through: Through) -> Result<usize, OrderError> {
+        let tenant = &stream.tenant;
+        if stream.is_tenants() {
+            return Ok(0);
+        }
+        let next = self.registries.get(tenant).map_or(Seq::FIRST, |r| r.uncovered(stream.key));
+        let due = replay::due_segments(&*self.store.log, stream, next, through)
+            .map_err(|error| OrderError::Read { tenant: tenant.clone(), error })?;
+        let count = due.len();
+        for segment in due {
+            self.obey(tenant, &Order::CloseSegment(segment))?;
+        }
+        Ok(count)
+    }
+
+    /// Signs the tenant's tree as it is, unless the newest checkpoint says the same, and keeps the
+    /// checkpoint with the others. Blocks.
+    ///
+    /// - returns: the signed note.
+    /// - errors: the tree does not continue the newest checkpoint, too: such a log is not signed.
+    pub fn checkpoint(&mut self, tenant: &TenantId) -> Result<String, OrderError> {
+        let fail = |error: CheckpointsError| OrderError::Evidence { tenant: tenant.clone(), error };
+        let none = Registry::default();
+        let registry = self.registries.get(tenant).unwrap_or(&none);
+        let newest = replay::newest_checkpoint(&self.store, tenant, registry).map_err(fail)?;
+        let leaves = replay::leaves_of(registry);
+        if let Some((note, checkpoint)) = newest
+            && checkpoint.size == leaves.len() as u64
+        {
+            return Ok(note);
+        }
+        let signer = replay::signer_of(&self.store, tenant).map_err(fail)?;
+        let (origin, size) = (signer.name().to_owned(), leaves.len() as u64);
+        let note = Checkpoint { origin, size, root: Tree(&leaves).root() }.sign(&signer);
+        let kept = self.store.checkpoints.append(tenant, &note);
+        kept.map_err(|error| fail(error.into()))?;
+        Ok(note)
+    }
+
+    /// Closes what is due of each stream of the tenant, and signs.
+    pub fn sign(&mut self, tenant: &TenantId, through: Through) -> Result<String, OrderError> {
+        let streams = self.store.log.streams(tenant);
+        let streams =
+            streams.map_err(|error| OrderError::Read { tenant: tenant.clone(), error })?;
+        for stream in streams {
+            self.close(&stream, through)?;
+        }
+        self.checkpoint(tenant)
+    }
+
+    /// The tenants with a stream of their own or of people.
+    pub fn tenants(&self) -> Vec<TenantId> {
+        self.registries.keys().cloned().collect()
+    }
+
     /// Erases a person: destroys their key, drops their minds and snapshots, and says so in the
     /// tenant's stream, signed. Blocks. Repeating it is harmless.
     ///
@@ -151,7 +218,10 @@ impl Book {
         self.store
             .erase(stream)
             .map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
-        self.note_erasure(stream)
+        let noted = self.note_erasure(stream)?;
+        // Nobody will wake there again: what is left is covered now, sealed as it is.
+        self.close(stream, Through::Head)?;
+        Ok(noted)
     }
 
     fn note_erasure(&mut self, stream: &StreamId) -> Result<PersonErased, OrderError> {
@@ -191,6 +261,16 @@ impl Book {
             }
         }
         Ok(())
+    }
+}
+
+/// The first count of a tenant's bytes reads all of them: it is made here, before the doors know of
+/// a limit to hold it against, so that no door waits for it.
+fn count_bytes(store: &Store, tenant: &TenantId, registry: &Registry) {
+    if registry.standing().quotas().sealed_bytes.is_some()
+        && let Err(error) = store.log.sealed_bytes(tenant)
+    {
+        tracing::error!(%tenant, %error, "the count of a tenant's bytes failed");
     }
 }
 

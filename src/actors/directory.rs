@@ -6,6 +6,7 @@ use actix::{Actor, Context, Handler, Message, Recipient};
 
 use super::Registrar;
 use super::awake::{Awake, AwakeCount};
+use super::meters::Meters;
 use super::response::{Ask, ErrorCode, Hello, Response};
 use super::submit::{Presence, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
@@ -21,12 +22,14 @@ pub(super) struct Directory {
     pub awake_max: usize,
     pub hello: Hello,
     pub count: Arc<AwakeCount>,
+    meters: Arc<Meters>,
     pub registrar: Registrar,
     /// People who are being erased: nobody wakes them.
     pub leaving: BTreeSet<StreamId>,
     entries: HashMap<StreamId, Entry>,
-    /// From the tick of the last request to whose it was: the longest idle first.
-    order: BTreeMap<u64, StreamId>,
+    /// For each tenant with somebody awake, from the tick of the last request to whose it was: the
+    /// longest idle first.
+    order: BTreeMap<TenantId, BTreeMap<u64, StreamId>>,
     ticks: u64,
 }
 
@@ -92,6 +95,7 @@ impl Directory {
         awake_max: usize,
         hello: Hello,
         count: Arc<AwakeCount>,
+        meters: Arc<Meters>,
         registrar: Registrar,
     ) -> Directory {
         Directory {
@@ -99,6 +103,7 @@ impl Directory {
             awake_max,
             hello,
             count,
+            meters,
             registrar,
             leaving: BTreeSet::new(),
             entries: HashMap::new(),
@@ -115,10 +120,10 @@ impl Directory {
         }
         // Twice at most: an address that turns out to be closed is replaced by a fresh one.
         for _ in 0..2 {
-            if !self.entries.contains_key(&stream) && !self.wake(&stream, &submit.user, ctx) {
-                let crowd = "everybody who is awake is busy and no one else can be woken";
-                submit.answer.send(Response::busy(crowd, RETRY_CROWD_MS));
-                return;
+            if !self.entries.contains_key(&stream)
+                && let Err(response) = self.wake(&stream, &submit.user, ctx)
+            {
+                return submit.answer.send(*response);
             }
             self.touch(&stream);
             let entry = self.entries.get(&stream).expect("it was there or was just made");
@@ -140,10 +145,27 @@ impl Directory {
         }
     }
 
-    fn wake(&mut self, stream: &StreamId, user: &UserId, ctx: &mut Context<Self>) -> bool {
+    /// - errors: the answer when nobody more can be awake.
+    fn wake(
+        &mut self,
+        stream: &StreamId,
+        user: &UserId,
+        ctx: &mut Context<Self>,
+    ) -> Result<(), Box<Response>> {
         use actix::AsyncContext;
-        if self.entries.len() >= self.awake_max && !self.put_one_to_sleep() {
-            return false;
+        let tenant = &stream.tenant;
+        // At its own limit a tenant makes room among its own people, never among others'.
+        let awake = self.awake_of(tenant);
+        let quota = self.meters.quotas(tenant).awake_users;
+        if let Some(limit) = quota.filter(|limit| awake >= *limit as usize)
+            && !self.put_to_sleep(tenant)
+        {
+            return Err(self.meters.refuse_waking(tenant, awake, limit));
+        }
+        if self.entries.len() >= self.awake_max && !self.put_anyone_to_sleep() {
+            self.meters.note_busy(tenant);
+            let crowd = "everybody who is awake is busy and no one else can be woken";
+            return Err(Box::new(Response::busy(crowd, RETRY_CROWD_MS)));
         }
         self.ticks += 1;
         let (presence, generation) = (Presence::default(), self.ticks);
@@ -156,17 +178,31 @@ impl Directory {
             leaving: ctx.address().recipient(),
         });
         let entry = Entry { address, presence, generation, tick: self.ticks };
-        self.order.insert(self.ticks, stream.clone());
+        self.order.entry(tenant.clone()).or_default().insert(self.ticks, stream.clone());
         self.entries.insert(stream.clone(), entry);
-        true
+        self.meters.note_awake(tenant, self.awake_of(tenant));
+        Ok(())
     }
 
-    /// - returns: whether one of the longest idle had nothing to do and was told to sleep.
-    fn put_one_to_sleep(&mut self) -> bool {
-        let idle =
-            self.order.values().take(SLEEPERS_TRIED_MAX).find(|stream| {
-                self.entries.get(*stream).is_some_and(|entry| entry.presence.is_idle())
-            });
+    fn awake_of(&self, tenant: &TenantId) -> usize {
+        self.order.get(tenant).map_or(0, BTreeMap::len)
+    }
+
+    /// When all places are taken: the tenant with the most people awake gives one of them up.
+    fn put_anyone_to_sleep(&mut self) -> bool {
+        let mut tenants: Vec<(usize, TenantId)> =
+            self.order.iter().map(|(tenant, awake)| (awake.len(), tenant.clone())).collect();
+        tenants.sort_by(|one, other| other.cmp(one));
+        tenants.iter().any(|(_, tenant)| self.put_to_sleep(tenant))
+    }
+
+    /// - returns: whether one of the tenant's longest idle had nothing to do and was told to sleep.
+    fn put_to_sleep(&mut self, tenant: &TenantId) -> bool {
+        let Some(order) = self.order.get(tenant) else { return false };
+        let idle = order
+            .values()
+            .take(SLEEPERS_TRIED_MAX)
+            .find(|stream| self.entries.get(*stream).is_some_and(|entry| entry.presence.is_idle()));
         let Some(stream) = idle.cloned() else { return false };
         self.strike_off(&stream);
         tracing::debug!(%stream, "sleeps");
@@ -176,7 +212,13 @@ impl Directory {
     /// Removes the entry first and then tells the actor to stop, so that no message can follow.
     pub fn strike_off(&mut self, stream: &StreamId) {
         if let Some(entry) = self.entries.remove(stream) {
-            self.order.remove(&entry.tick);
+            if let Some(order) = self.order.get_mut(&stream.tenant) {
+                order.remove(&entry.tick);
+                if order.is_empty() {
+                    self.order.remove(&stream.tenant);
+                }
+            }
+            self.meters.note_awake(&stream.tenant, self.awake_of(&stream.tenant));
             entry.address.sleep.do_send(Sleep);
         }
     }
@@ -189,9 +231,10 @@ impl Directory {
     fn touch(&mut self, stream: &StreamId) {
         self.ticks += 1;
         let entry = self.entries.get_mut(stream).expect("the caller looked");
-        self.order.remove(&entry.tick);
+        let order = self.order.entry(stream.tenant.clone()).or_default();
+        order.remove(&entry.tick);
         entry.tick = self.ticks;
-        self.order.insert(self.ticks, stream.clone());
+        order.insert(self.ticks, stream.clone());
     }
 }
 

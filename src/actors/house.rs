@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -9,9 +10,10 @@ use super::awake::AwakeCount;
 use super::directory::{Address, Directory, People, SleepAll, Waking};
 use super::farewell::Farewell;
 use super::life::{Life, Parts};
+use super::meters::{Meters, Usage};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{Book, Erased, Failure, Hello, OrderError, Registrar, Submit};
+use super::{AnswerTo, Ask, Book, Erased, Failure, Hello, OrderError, Registrar, Response, Submit};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
@@ -22,6 +24,7 @@ use crate::world::Domain;
 pub struct House {
     directory: Addr<Directory>,
     registrar: Registrar,
+    meters: Arc<Meters>,
     system: System,
     thread: Option<JoinHandle<()>>,
     failure: Failure,
@@ -71,14 +74,17 @@ pub enum ActorsError {
 /// Where front ends hand in requests. Knows no domain.
 #[derive(Clone)]
 pub struct Front {
-    submit: Recipient<Submit>,
+    directory: Recipient<Submit>,
     farewell: Recipient<Farewell>,
+    meters: Arc<Meters>,
 }
 
 /// A request that was not taken, given back.
 pub enum NotTaken {
     /// Too many are waiting.
     Full(Box<Submit>),
+    /// Its tenant has too much of something, or all together have; this is what to answer.
+    Over(Box<Submit>, Box<Response>),
     /// Nobody is there any more.
     Closed(Box<Submit>),
 }
@@ -94,8 +100,24 @@ impl Front {
         self.farewell.do_send(Farewell { tenant, user, answer: Box::new(answer) });
     }
 
-    pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
-        self.submit.try_send(submit).map_err(|error| match error {
+    /// Counts a request that is not for anybody's actor, until it is answered.
+    ///
+    /// - errors: what to answer, when its tenant has too many in hand, or all together have.
+    pub fn let_in(
+        &self,
+        tenant: &TenantId,
+        ask: &Ask,
+        answer: &mut AnswerTo,
+    ) -> Result<(), Box<Response>> {
+        answer.let_in(self.meters.admit(tenant, ask)?);
+        Ok(())
+    }
+
+    pub fn submit(&self, mut submit: Submit) -> Result<(), NotTaken> {
+        if let Err(response) = self.let_in(&submit.tenant, &submit.ask, &mut submit.answer) {
+            return Err(NotTaken::Over(Box::new(submit), response));
+        }
+        self.directory.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
             SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
         })
@@ -125,12 +147,15 @@ impl House {
         let minds = Arc::<Minds>::default();
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
         let book = Book::open(store.clone())?;
+        let meters = Arc::new(Meters::new(book.admissions().clone(), store.log.clone()));
         let parts = Parts {
             domain,
             store,
             recipe,
             recipe_text,
+            trainers,
             minds: minds.clone(),
+            meters: meters.clone(),
             failure: failure.clone(),
             open: lives.enter(),
         };
@@ -139,6 +164,7 @@ impl House {
         let (started, ready) = mpsc::channel();
         let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
         let (failed, book_open) = (failure.clone(), lives.enter());
+        let measured = meters.clone();
         let thread = thread::Builder::new()
             .name("actors".to_owned())
             .spawn(move || {
@@ -146,8 +172,8 @@ impl House {
                 let system = System::new();
                 let (directory, registrar) = system.block_on(async move {
                     let registrar = Registrar::start(book, book_open, failed);
-                    let life = Life::start(parts, registrar.clone(), |life| {
-                        SyncArbiter::start(trainers.max(1), move || Trainer { life: life.clone() })
+                    let life = Life::start(parts, registrar.clone(), |life, trainers| {
+                        SyncArbiter::start(trainers, move || Trainer { life: life.clone() })
                     });
                     let arbiters: Vec<Arbiter> =
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
@@ -155,7 +181,8 @@ impl House {
                     let people = Box::new(Homes { life, homes });
                     let for_directory = registrar.clone();
                     let directory =
-                        Directory::new(people, awake_max, hello, count, for_directory).start();
+                        Directory::new(people, awake_max, hello, count, measured, for_directory)
+                            .start();
                     (directory, registrar)
                 });
                 let _ = started.send((directory, registrar, System::current()));
@@ -171,6 +198,7 @@ impl House {
         Ok(House {
             directory,
             registrar,
+            meters,
             system,
             thread,
             failure,
@@ -184,7 +212,16 @@ impl House {
 
     pub fn front(&self) -> Front {
         let directory = self.directory.clone();
-        Front { submit: directory.clone().recipient(), farewell: directory.recipient() }
+        Front {
+            directory: directory.clone().recipient(),
+            farewell: directory.recipient(),
+            meters: self.meters.clone(),
+        }
+    }
+
+    /// What each tenant takes, and how often it was turned away.
+    pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
+        self.meters.usage()
     }
 
     /// Where orders about tenants are handed in.

@@ -2,16 +2,17 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use actix::Addr;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::awake::Awake;
-use super::trainer::Trainer;
+use super::meters::Meters;
+use super::trainer::{Run, Seat, Train, Trainer};
 use super::{ErrorCode, Failure, Registrar, Response};
 use crate::events::Record;
+use crate::fairness::Trainings;
 use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
@@ -27,7 +28,10 @@ pub(super) struct Parts<D: Domain> {
     pub store: Store,
     pub recipe: Recipe,
     pub recipe_text: String,
+    /// Trainings at once.
+    pub trainers: usize,
     pub minds: Arc<Minds>,
+    pub meters: Arc<Meters>,
     pub failure: Failure,
     pub open: Awake,
 }
@@ -56,9 +60,10 @@ pub(super) struct Life<D: Domain> {
     recipe_text: String,
     base: Arc<Mind>,
     minds: Arc<Minds>,
+    meters: Arc<Meters>,
     trainer: OnceLock<Addr<Trainer<D>>>,
     registrar: Registrar,
-    places: Arc<Semaphore>,
+    trainings: Mutex<Trainings<Train<D>>>,
     failure: Failure,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
     _open: Awake,
@@ -69,23 +74,25 @@ impl<D: Domain> Life<D> {
     pub fn start(
         seeded: Seeded<D>,
         registrar: Registrar,
-        trainer: impl FnOnce(Arc<Life<D>>) -> Addr<Trainer<D>>,
+        trainer: impl FnOnce(Arc<Life<D>>, usize) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
-        let Parts { domain, store, recipe: _, recipe_text, minds, failure, open } = parts;
+        let Parts { domain, store, recipe: _, recipe_text, trainers, minds, meters, failure, open } =
+            parts;
         let life = Arc::new(Life {
             domain,
             store,
             recipe_text,
             base,
             minds,
+            meters,
             trainer: OnceLock::new(),
             registrar,
-            places: Arc::new(Semaphore::new(TRAIN_QUEUE_MAX)),
+            trainings: Mutex::new(Trainings::new(trainers)),
             failure,
             _open: open,
         });
-        let address = trainer(life.clone());
+        let address = trainer(life.clone(), trainers.max(1));
         assert!(life.trainer.set(address).is_ok(), "it was just made and is set once");
         life
     }
@@ -96,12 +103,7 @@ impl<D: Domain> Life<D> {
         &*self.store.log
     }
 
-    pub fn trainer(&self) -> &Addr<Trainer<D>> {
-        self.trainer.get().expect("set before the first actor starts")
-    }
-
     /// Who writes the tenants' own streams.
-    #[expect(dead_code, reason = "evidence asks for it")]
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
     }
@@ -120,9 +122,50 @@ impl<D: Domain> Life<D> {
         Timestamp(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
     }
 
-    /// A place in the trainers' queue, while there is one.
-    pub fn place_in_queue(&self) -> Option<OwnedSemaphorePermit> {
-        self.places.clone().try_acquire_owned().ok()
+    /// Queues a training.
+    ///
+    /// - returns: whether there was a place for it.
+    pub fn queue_training(self: &Arc<Self>, train: Train<D>) -> bool {
+        let stream = train.stream.clone();
+        let quota = self.meters.quotas(&stream.tenant).trainings_waiting;
+        let most = quota.map_or(TRAIN_QUEUE_MAX, |quota| TRAIN_QUEUE_MAX.min(quota as usize));
+        let queued = self.trainings().push(&stream, train, most);
+        // What it took the place of was asked for by a former actor of the same person, who is
+        // gone.
+        let taken = queued.is_ok();
+        if !taken {
+            self.meters.note_training_refused(&stream.tenant);
+        }
+        self.hand_out_trainings();
+        taken
+    }
+
+    /// A training is over.
+    pub fn trained(self: &Arc<Self>, stream: &StreamId) {
+        self.trainings().finish(stream);
+        self.hand_out_trainings();
+    }
+
+    /// Gives free trainers what is due. The trainers' own queue is not bounded and knows no
+    /// tenants: it never holds more than there are trainers.
+    fn hand_out_trainings(self: &Arc<Self>) {
+        let trainer = self.trainer.get().expect("set before the first actor starts");
+        if !trainer.connected() {
+            // The system stops. Whoever waits finds out at the next waking that it is still due.
+            let waiting = self.trainings().clear();
+            return drop(waiting);
+        }
+        loop {
+            let next = self.trainings().start();
+            let Some((stream, train)) = next else { return };
+            let seat = Seat { life: self.clone(), stream };
+            trainer.do_send(Run { train, seat });
+        }
+    }
+
+    // Its methods leave it whole whenever they return, and none of them calls back.
+    fn trainings(&self) -> MutexGuard<'_, Trainings<Train<D>>> {
+        self.trainings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub fn mind(&self, tenant: &TenantId, digest: Digest) -> Option<Arc<Mind>> {

@@ -7,6 +7,7 @@ mod failure;
 mod farewell;
 mod house;
 mod life;
+mod meters;
 mod operator;
 mod registrar;
 mod response;
@@ -17,7 +18,10 @@ mod user;
 pub use book::{Book, OrderError, fold as fold_tenant};
 pub use failure::{Alarm, Failure};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
+pub use meters::{Refusals, Usage};
 pub use operator::{ErasedView, KeyView, Ordered, TenantAsk, TenantVerb, TenantView};
-pub use registrar::{Erased, Obeyed, Registrar};
-pub use response::{Ask, Busy, ErrorCode, Failed, Hello, Rejected, Response, Waited};
+pub use registrar::{Erased, Obeyed, Registrar, Signed};
+pub use response::{
+    Ask, Busy, ErrorCode, Failed, Hello, Quota, QuotaExceeded, Rejected, Response, Waited,
+};
 pub use submit::{AnswerTo, Submit};

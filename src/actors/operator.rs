@@ -112,6 +112,7 @@ impl From<OrderError> for Response {
             OrderError::Append { .. }
             | OrderError::Key { .. }
             | OrderError::Read { .. }
+            | OrderError::Evidence { .. }
             | OrderError::Disagreement { .. } => Response::error(ErrorCode::Unavailable, message),
         }
     }

@@ -1,4 +1,6 @@
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use actix::{Actor, Addr, Handler, Message, SyncArbiter, SyncContext};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -8,6 +10,7 @@ use super::{Book, Failure, OrderError};
 use crate::events::{Event, PersonErased};
 use crate::ids::{StreamId, TenantId};
 use crate::limits::REGISTRAR_QUEUE_MAX;
+use crate::replay::Through;
 use crate::store::AppendError;
 use crate::tenancy::{Admissions, Order};
 
@@ -23,6 +26,12 @@ pub struct Registrar {
 /// What came of an order.
 pub type Obeyed = Result<Vec<Event>, OrderError>;
 
+/// A signed checkpoint.
+pub type Signed = Result<String, OrderError>;
+
+/// Seconds between two checkpoints of one tenant that nobody asked for.
+const CHECKPOINT_EVERY_S: u64 = 60;
+
 struct Clerk {
     desk: Arc<Mutex<Desk>>,
     failure: Failure,
@@ -30,8 +39,27 @@ struct Clerk {
 
 struct Desk {
     book: Book,
+    /// When each tenant's tree was signed last, and whether it has grown since.
+    signed: BTreeMap<TenantId, (Instant, bool)>,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
     _open: Awake,
+}
+
+/// A person's episode ended, or they woke: segments may be due.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Close {
+    stream: StreamId,
+    _place: OwnedSemaphorePermit,
+}
+
+#[derive(Message)]
+#[rtype(result = "()")]
+struct SignTree {
+    tenant: TenantId,
+    through: Through,
+    answer: Box<dyn FnOnce(Signed) + Send>,
+    _place: OwnedSemaphorePermit,
 }
 
 #[derive(Message)]
@@ -59,7 +87,7 @@ impl Registrar {
     /// Must run on the actix system's thread.
     pub(super) fn start(book: Book, open: Awake, failure: Failure) -> Registrar {
         let admissions = book.admissions().clone();
-        let desk = Arc::new(Mutex::new(Desk { book, _open: open }));
+        let desk = Arc::new(Mutex::new(Desk { book, signed: BTreeMap::new(), _open: open }));
         let address =
             SyncArbiter::start(1, move || Clerk { desk: desk.clone(), failure: failure.clone() });
         Registrar { address, places: Arc::new(Semaphore::new(REGISTRAR_QUEUE_MAX)), admissions }
@@ -79,6 +107,30 @@ impl Registrar {
         let answer = Box::new(move |obeyed| answer.send(obeyed));
         // A queue that is closed drops the order, and a dropped answer says so.
         self.address.do_send(Obey { tenant, order, answer, _place: place });
+    }
+
+    /// Closes what is due of a person's stream, some time soon. What is forgotten, because the queue
+    /// is full or the service ends, is closed when they wake again.
+    pub fn close(&self, stream: &StreamId) {
+        if let Ok(place) = self.places.clone().try_acquire_owned() {
+            self.address.do_send(Close { stream: stream.clone(), _place: place });
+        }
+    }
+
+    /// Signs a tenant's tree, after closing what is due of each of its people's streams; `answer` is
+    /// called once, from another thread, when the checkpoint is kept.
+    pub fn checkpoint(
+        &self,
+        tenant: TenantId,
+        through: Through,
+        answer: impl FnOnce(Signed) + Send + 'static,
+    ) {
+        let answer = Answer(Some(Box::new(answer)));
+        let Ok(place) = self.places.clone().try_acquire_owned() else {
+            return answer.send(Err(OrderError::Busy));
+        };
+        let answer = Box::new(move |signed| answer.send(signed));
+        self.address.do_send(SignTree { tenant, through, answer, _place: place });
     }
 
     /// Erases a person for whom nobody speaks any more; `answer` as in [`Registrar::order`].
@@ -121,29 +173,32 @@ impl Actor for Clerk {
     type Context = SyncContext<Self>;
 }
 
-impl Handler<Obey> for Clerk {
-    type Result = ();
-
-    fn handle(&mut self, obey: Obey, _: &mut SyncContext<Self>) {
-        let Obey { tenant, order, answer, _place } = obey;
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let obeyed = desk.book.obey(&tenant, &order);
-        drop(desk);
-        self.look_at(obeyed.as_ref().err());
-        answer(obeyed);
+impl Desk {
+    /// Closes, and signs now and then, so that a feed of checkpoints goes on by itself.
+    fn close(&mut self, stream: &StreamId) -> Result<(), OrderError> {
+        if self.book.close(stream, Through::Episodes)? == 0 {
+            return Ok(());
+        }
+        let tenant = &stream.tenant;
+        let last = self.signed.get(tenant).map(|(at, _)| *at);
+        if last.is_none_or(|at| at.elapsed().as_secs() >= CHECKPOINT_EVERY_S) {
+            self.book.checkpoint(tenant)?;
+            self.signed.insert(tenant.clone(), (Instant::now(), false));
+        } else if let Some((_, grown)) = self.signed.get_mut(tenant) {
+            *grown = true;
+        }
+        Ok(())
     }
 }
 
-impl Handler<Erase> for Clerk {
-    type Result = ();
-
-    fn handle(&mut self, erase: Erase, _: &mut SyncContext<Self>) {
-        let Erase { stream, answer, _place } = erase;
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let erased = desk.book.erase(&stream);
-        drop(desk);
-        self.look_at(erased.as_ref().err());
-        answer(erased);
+impl Drop for Desk {
+    /// The last checkpoint of a service covers all that it closed.
+    fn drop(&mut self) {
+        for (tenant, _) in self.signed.iter().filter(|(_, (_, grown))| *grown) {
+            if let Err(error) = self.book.checkpoint(tenant) {
+                tracing::warn!(%tenant, %error, "no checkpoint was signed at the end");
+            }
+        }
     }
 }
 
@@ -155,5 +210,59 @@ impl Clerk {
         {
             self.failure.report(error.to_string());
         }
+    }
+
+    fn desk(&self) -> MutexGuard<'_, Desk> {
+        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Handler<Close> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, close: Close, _: &mut SyncContext<Self>) {
+        let closed = self.desk().close(&close.stream);
+        if let Err(error) = closed {
+            tracing::warn!(stream = %close.stream, %error, "segments are left to be closed later");
+            self.look_at(Some(&error));
+        }
+    }
+}
+
+impl Handler<SignTree> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, sign: SignTree, _: &mut SyncContext<Self>) {
+        let SignTree { tenant, through, answer, _place } = sign;
+        let mut desk = self.desk();
+        let signed = desk.book.sign(&tenant, through);
+        if signed.is_ok() {
+            desk.signed.insert(tenant, (Instant::now(), false));
+        }
+        drop(desk);
+        self.look_at(signed.as_ref().err());
+        answer(signed);
+    }
+}
+
+impl Handler<Obey> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, obey: Obey, _: &mut SyncContext<Self>) {
+        let Obey { tenant, order, answer, _place } = obey;
+        let obeyed = self.desk().book.obey(&tenant, &order);
+        self.look_at(obeyed.as_ref().err());
+        answer(obeyed);
+    }
+}
+
+impl Handler<Erase> for Clerk {
+    type Result = ();
+
+    fn handle(&mut self, erase: Erase, _: &mut SyncContext<Self>) {
+        let Erase { stream, answer, _place } = erase;
+        let erased = self.desk().book.erase(&stream);
+        self.look_at(erased.as_ref().err());
+        answer(erased);
     }
 }

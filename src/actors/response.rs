@@ -38,6 +38,8 @@ pub enum Response {
     Rejected(Rejected),
     /// Not now. The same request id may be sent again.
     Busy(Busy),
+    /// The tenant takes more than it may. Nothing was recorded.
+    QuotaExceeded(QuotaExceeded),
     /// Cannot be answered; sending it again does not help.
     Error(Failed),
 }
@@ -74,6 +76,31 @@ pub struct Rejected {
 pub struct Busy {
     pub message: String,
     pub retry_after_ms: u32,
+}
+
+/// A tenant's limit, and how it stands to it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct QuotaExceeded {
+    pub quota: Quota,
+    pub used: u64,
+    pub limit: u64,
+    /// When the same request id may be sent again; none when time alone does not help.
+    pub retry_after_ms: Option<u32>,
+    pub message: String,
+}
+
+/// What a tenant can have too much of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quota {
+    /// People awake at once.
+    AwakeUsers,
+    /// Requests taken and not yet answered.
+    InFlight,
+    /// Utterances, and other commands, a second; a query counts a tenth.
+    Utterances,
+    /// Bytes in the log.
+    SealedBytes,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use actix::Message;
 
+use super::meters::InFlight;
 use super::{Ask, Response};
 use crate::ids::{RequestId, TenantId, UserId};
 
@@ -26,6 +27,8 @@ pub struct AnswerTo {
     way: Option<Box<dyn FnOnce(Response) + Send>>,
     /// Keeps the person's actor from being put to sleep before there is an answer.
     awake: Option<Attention>,
+    /// Its tenant's place among the requests in flight.
+    in_flight: Option<InFlight>,
 }
 
 /// Milliseconds after which a request that was lost inside the service may be sent again: long
@@ -34,16 +37,21 @@ const RETRY_LOST_MS: u32 = 50;
 
 impl AnswerTo {
     pub fn new(way: impl FnOnce(Response) + Send + 'static) -> AnswerTo {
-        AnswerTo { way: Some(Box::new(way)), awake: None }
+        AnswerTo { way: Some(Box::new(way)), awake: None, in_flight: None }
     }
 
     pub fn send(mut self, response: Response) {
         // Before the answer is out: whoever gets it may ask at once for somebody else, who needs
         // this one's place. The message that sends an actor to sleep waits for its handler's end.
         self.awake = None;
+        self.in_flight = None;
         if let Some(way) = self.way.take() {
             way(response);
         }
+    }
+
+    pub(super) fn let_in(&mut self, in_flight: InFlight) {
+        self.in_flight = Some(in_flight);
     }
 
     pub(super) fn hold(&mut self, attention: Attention) {
@@ -53,6 +61,7 @@ impl AnswerTo {
 
 impl Drop for AnswerTo {
     fn drop(&mut self) {
+        self.in_flight = None;
         if let Some(way) = self.way.take() {
             way(Response::busy("the request was interrupted; send it again", RETRY_LOST_MS));
         }

@@ -3,7 +3,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use actix::{Actor, Handler, Message, Recipient, SyncContext};
-use tokio::sync::OwnedSemaphorePermit;
 
 use super::life::{self, Life};
 use super::submit::Attention;
@@ -17,19 +16,35 @@ pub(super) struct Trainer<D: Domain> {
 }
 
 /// A training that is due.
-#[derive(Message)]
-#[rtype(result = "()")]
 pub(super) struct Train<D: Domain> {
     pub stream: StreamId,
     pub recipe: Arc<Recipe>,
     pub lessons: Vec<Lesson<D::Scene, D::Task>>,
     /// Whom to tell.
     pub tell: Recipient<Trained>,
-    /// A place in the queue, bounded by `limits::TRAIN_QUEUE_MAX`: the queue of a `SyncArbiter` is
-    /// not bounded by itself.
-    pub place: OwnedSemaphorePermit,
     /// Nobody whose training runs is put to sleep.
     pub attention: Attention,
+}
+
+/// A training whose turn it is.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub(super) struct Run<D: Domain> {
+    pub train: Train<D>,
+    pub seat: Seat<D>,
+}
+
+/// One of the trainers, taken. When it is dropped, however the training ended, the next one in
+/// turn gets it.
+pub(super) struct Seat<D: Domain> {
+    pub life: Arc<Life<D>>,
+    pub stream: StreamId,
+}
+
+impl<D: Domain> Drop for Seat<D> {
+    fn drop(&mut self) {
+        self.life.trained(&self.stream);
+    }
 }
 
 /// How a training ended.
@@ -45,11 +60,11 @@ impl<D: Domain> Actor for Trainer<D> {
     type Context = SyncContext<Self>;
 }
 
-impl<D: Domain> Handler<Train<D>> for Trainer<D> {
+impl<D: Domain> Handler<Run<D>> for Trainer<D> {
     type Result = ();
 
-    fn handle(&mut self, train: Train<D>, _: &mut SyncContext<Self>) {
-        let Train { stream, recipe, lessons, tell, place, attention } = train;
+    fn handle(&mut self, run: Run<D>, _: &mut SyncContext<Self>) {
+        let Run { train: Train { stream, recipe, lessons, tell, attention }, seat } = run;
         let start = Instant::now();
         // A panic that left this handler would end the worker for good, and with it, one by one,
         // every training of everybody.
@@ -65,7 +80,7 @@ impl<D: Domain> Handler<Train<D>> for Trainer<D> {
             failed = outcome.is_err(),
             "trained"
         );
-        drop(place);
+        drop(seat);
         // Past the mailbox bound on purpose: this message must not be lost, and there is at most
         // one for each person.
         tell.do_send(Trained { recipe: recipe.digest(), outcome, attention });

@@ -255,6 +255,10 @@ impl<D: Domain> UserActor<D> {
         if reply.told.iter().any(|told| matches!(told, Told::EpisodeEnded { .. })) {
             life::keep_snapshot(&self.life, &self.waking.stream, session);
         }
+        let ends = |told: &Told| matches!(told, Told::EpisodeEnded { .. } | Told::Closed { .. });
+        if reply.told.iter().any(ends) {
+            self.life.registrar().close(&self.waking.stream);
+        }
     }
 
     fn ask_for_training(&mut self, ctx: &mut Context<Self>) {
@@ -263,22 +267,19 @@ impl<D: Domain> UserActor<D> {
             return;
         }
         let Some(Outstanding::Retrain { recipe, lessons }) = session.outstanding() else { return };
-        let Some(place) = self.life.place_in_queue() else {
-            tracing::warn!(stream = %self.waking.stream, "the trainers' queue is full; asking again");
-            ctx.run_later(Duration::from_secs(TRAIN_AGAIN_S), |actor, ctx| {
-                actor.ask_for_training(ctx);
-            });
-            return;
-        };
-        self.training = true;
-        self.life.trainer().do_send(Train {
+        self.training = self.life.queue_training(Train {
             stream: self.waking.stream.clone(),
             recipe,
             lessons,
             tell: ctx.address().recipient(),
-            place,
             attention: self.waking.presence.attend(),
         });
+        if !self.training {
+            tracing::warn!(stream = %self.waking.stream, "the tenant's queue for training is full");
+            ctx.run_later(Duration::from_secs(TRAIN_AGAIN_S), |actor, ctx| {
+                actor.ask_for_training(ctx);
+            });
+        }
     }
 
     /// The state did not change: the turn is dropped. When it is certain that nothing was appended
@@ -325,6 +326,8 @@ impl<D: Domain> Actor for UserActor<D> {
             match woken {
                 Ok(session) => {
                     actor.stage = Stage::Awake(Box::new(session));
+                    // What a crash kept from being closed.
+                    actor.life.registrar().close(&actor.waking.stream);
                     actor.ask_for_training(ctx);
                 }
                 Err(response) => {

@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::failure::Failure;
 use super::logging::Logging;
 use super::{
-    audit, check_copy, converse, erase, eval, export, import, keys, log, replay, salvage,
-    self_test, serve, talk, tenant, transcript, verify,
+    audit, check_copy, checkpoint, converse, erase, eval, export, import, keys, log, proof, replay,
+    salvage, self_test, serve, talk, tenant, transcript, verify,
 };
 use crate::store;
 
@@ -24,6 +24,9 @@ Examples:
   apprentice replay --data demo --user you --at 17
   apprentice audit --data demo --repropose --retrain
   apprentice salvage --data demo --out rescued
+  apprentice checkpoint --data lab --out lab.checkpoint
+  apprentice proof --data lab --user ada --seq 17 --out ada-17.proof
+  apprentice verify ada-17.proof --key lab.pub
 
 Exit codes:
   0  fine; the end of input is fine too
@@ -62,6 +65,8 @@ enum Verb {
     Export(export::Arguments),
     Import(import::Arguments),
     Erase(erase::Arguments),
+    Checkpoint(checkpoint::Arguments),
+    Proof(proof::Arguments),
     Verify(verify::Arguments),
     #[command(hide = true)]
     CheckCopy(check_copy::Arguments),
@@ -105,6 +110,8 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Export(arguments)) => export::run(arguments),
         Some(Verb::Import(arguments)) => import::run(arguments),
         Some(Verb::Erase(arguments)) => erase::run(arguments),
+        Some(Verb::Checkpoint(arguments)) => checkpoint::run(arguments),
+        Some(Verb::Proof(arguments)) => proof::run(arguments),
         Some(Verb::Verify(arguments)) => verify::run(arguments),
         Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }

@@ -8,7 +8,7 @@ use clap::Args;
 use super::bar::Bar;
 use super::failure::Failure;
 use super::{past, terminal::count};
-use crate::ids::TenantId;
+use crate::ids::{StreamKey, TenantId};
 use crate::replay::{self, AuditReport, Counts, Scrutiny, StreamReport};
 use crate::world::household::Household;
 
@@ -87,6 +87,7 @@ fn readable(report: &AuditReport, scrutiny: Scrutiny) -> String {
 fn stream_lines(stream: &StreamReport) -> Vec<String> {
     let who = match (&stream.user, stream.erased) {
         (Some(user), _) => user.to_string(),
+        _ if stream.stream == StreamKey::TENANT => "the tenant's own".to_owned(),
         (None, true) => "erased".to_owned(),
         (None, false) => "unknown".to_owned(),
     };
@@ -109,6 +110,9 @@ fn count_lines(counts: &Counts, scrutiny: Scrutiny) -> Vec<String> {
         n(counts.episodes, "episode"),
         n(counts.utterances, "utterance")
     )];
+    if counts.segments > 0 {
+        lines.push(format!("held {} against their records", n(counts.segments, "segment")));
+    }
     if counts.erased_streams > 0 {
         lines.push(format!(
             "of {} only the chain was checked: the people behind them were erased",

@@ -71,6 +71,7 @@ fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure
     };
     let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(out);
     let mut file = BufWriter::new(file.map_err(failed)?);
+    let people = streams.iter().filter(|stream| !stream.is_tenants()).count() as u64;
     let (mut records, mut erased) = (0_u64, 0_u64);
     let written = (|| {
         for stream in &streams {
@@ -99,7 +100,7 @@ fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure
         let _ = fs::remove_file(out);
     }
     written?;
-    println!("exported {records} records of {} people", streams.len() as u64 - erased);
+    println!("exported {records} records of {} people", people - erased);
     if erased > 0 {
         eprintln!("apprentice: {erased} people were erased and are not in it");
     }

@@ -43,7 +43,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
             for sentence in &lost {
                 println!("lost: {sentence}");
             }
-            let people = salvaged.streams.iter().filter(|found| found.valid.seq > 0).count();
+            let people = salvaged.streams.iter().filter(|found| !found.stream.is_tenants());
+            let people = people.filter(|found| found.valid.seq > 0).count();
             println!("kept: {kept} records of {people} people");
         }
     }

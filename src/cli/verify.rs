@@ -76,7 +76,7 @@ pub(super) fn public_key(named: &str) -> Result<VerifierKey, Failure> {
     text.trim().parse().map_err(|error| Failure::bad_input(format!("{named}: {error}")))
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     std::fs::read(path)
         .map_err(|error| Failure::bad_input(format!("{} cannot be read: {error}", path.display())))
 }

@@ -23,5 +23,5 @@ pub use note::{KeyNameError, NoteError, NoteSigner, VerifierKey};
 pub use proof::{Consistency, Inclusion, Proof, ProofError, Revealed};
 pub use segment::Segment;
 pub use statement::{is_signed, sign};
-pub use tree::{Frontier, Tree, TreeHash, is_consistent, root_by_path};
+pub use tree::{Tree, TreeHash, is_consistent, root_by_path};
 pub use verify::{Verified, VerifiedRecord, VerifyError, verify};

@@ -184,37 +184,5 @@ pub fn is_consistent(old: (u64, TreeHash), new: (u64, TreeHash), path: &[TreeHas
     last == 0 && old_root == old.1 && new_root == new.1
 }
 
-/// A tree that only grows and keeps the hashes it still needs: one for each power of two in its
-/// size.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Frontier {
-    size: u64,
-    /// Roots of whole subtrees, the largest first.
-    peaks: Vec<TreeHash>,
-}
-
-impl Frontier {
-    pub fn push(&mut self, leaf: TreeHash) {
-        let mut root = leaf;
-        // As many subtrees become whole as the size has ones at its low end.
-        for _ in 0..self.size.trailing_ones() {
-            let left = self.peaks.pop().expect("a peak for each one in the size");
-            root = TreeHash::of_node(left, root);
-        }
-        self.peaks.push(root);
-        self.size += 1;
-    }
-
-    pub fn size(&self) -> u64 {
-        self.size
-    }
-
-    pub fn root(&self) -> TreeHash {
-        let mut peaks = self.peaks.iter().rev();
-        let Some(&smallest) = peaks.next() else { return TreeHash::empty() };
-        peaks.fold(smallest, |right, &left| TreeHash::of_node(left, right))
-    }
-}
-
 #[cfg(test)]
 mod tests;

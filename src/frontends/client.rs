@@ -5,7 +5,8 @@ use super::knock::{Knock, knock};
 use super::wire::{self, Request};
 use super::{Context, CurveKey, Endpoint, EndpointError, z85};
 use crate::actors::{
-    Ask, ErasedView, Hello, Ordered, Response, TenantAsk, TenantVerb, TenantView, Waited,
+    Ask, ErasedView, Hello, Ordered, Quota, QuotaExceeded, Response, TenantAsk, TenantVerb,
+    TenantView, Waited,
 };
 use crate::ids::{PublicKey, RequestId, Seq, TenantId, UserId};
 use crate::limits::{CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, WAIT_S_MAX};
@@ -73,6 +74,9 @@ pub enum ClientError {
     NoKeyWanted { endpoint: String },
     #[error("the service at {endpoint} stayed busy for {seconds} s: {message}")]
     Busy { endpoint: String, seconds: u64, message: String },
+    /// The tenant takes more than it may, and waiting did not help or would not.
+    #[error("{message}")]
+    OverQuota { quota: Quota, used: u64, limit: u64, message: String },
     #[error("the request has {found} bytes; at most {FRAME_BYTES_MAX} can be sent")]
     TooLarge { found: usize },
     #[error("the service at {endpoint} answered something else than was asked: {reason}")]
@@ -333,6 +337,18 @@ impl Client {
                     busy = Some(answer.message);
                     send = false;
                 }
+                Some(Response::QuotaExceeded(over)) => match over.retry_after_ms {
+                    // Later than anybody waits: said at once.
+                    Some(ms) if now + Duration::from_millis(u64::from(ms)) < end => {
+                        pause = Duration::from_millis(u64::from(ms.max(1)));
+                        busy = Some(over.message);
+                        send = false;
+                    }
+                    _ => {
+                        let QuotaExceeded { quota, used, limit, message, .. } = over;
+                        return Err(ClientError::OverQuota { quota, used, limit, message });
+                    }
+                },
                 Some(Response::Rejected(rejected)) => {
                     let (code, message) = (rejected.code, rejected.message);
                     return Err(ClientError::Rejected { code, message });
@@ -454,7 +470,10 @@ impl Client {
             Response::Ordered(_) => "the end of an order",
             Response::Tenants(_) => "tenants",
             Response::Erased(_) => "an erasure",
-            Response::Rejected(_) | Response::Busy(_) | Response::Error(_) => "a refusal",
+            Response::Rejected(_)
+            | Response::Busy(_)
+            | Response::QuotaExceeded(_)
+            | Response::Error(_) => "a refusal",
         };
         ClientError::Puzzling { endpoint: self.endpoint.clone(), reason: kind.to_owned() }
     }

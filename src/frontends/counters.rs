@@ -10,6 +10,7 @@ pub struct Counters {
     pub(super) refused: AtomicU64,
     pub(super) denied: AtomicU64,
     pub(super) busy: AtomicU64,
+    pub(super) over_quota: AtomicU64,
     pub(super) undelivered: AtomicU64,
     pub(super) handshakes: AtomicU64,
     pub(super) handshakes_denied: AtomicU64,
@@ -30,6 +31,8 @@ pub struct Counts {
     pub denied: u64,
     /// Turned away by the gateway itself because of too much work.
     pub busy: u64,
+    /// Turned away by the gateway because their tenant takes more than it may.
+    pub over_quota: u64,
     /// Answers whose peer was gone or did not read.
     pub undelivered: u64,
     /// Connections let in by their key.
@@ -49,6 +52,7 @@ impl Counters {
             refused: read(&self.refused),
             denied: read(&self.denied),
             busy: read(&self.busy),
+            over_quota: read(&self.over_quota),
             undelivered: read(&self.undelivered),
             handshakes: read(&self.handshakes),
             handshakes_denied: read(&self.handshakes_denied),

@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::orders::WireOrder;
 use crate::actors::{
-    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, Ordered, Rejected, Response, TenantAsk,
-    TenantView, Waited,
+    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, Ordered, QuotaExceeded, Rejected, Response,
+    TenantAsk, TenantView, Waited,
 };
 use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
@@ -276,6 +276,8 @@ struct ResponseMap {
     #[serde(skip_serializing_if = "Option::is_none")]
     busy: Option<Busy>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    quota_exceeded: Option<QuotaExceeded>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<Failed>,
 }
 
@@ -296,6 +298,7 @@ pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
         Response::Erased(erased) => map.erased = Some(erased),
         Response::Rejected(rejected) => map.rejected = Some(rejected),
         Response::Busy(busy) => map.busy = Some(busy),
+        Response::QuotaExceeded(over) => map.quota_exceeded = Some(over),
         Response::Error(failed) => map.error = Some(failed),
     }
     pack(&map)
@@ -322,6 +325,7 @@ pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
         map.erased.map(Response::Erased),
         map.rejected.map(Response::Rejected),
         map.busy.map(Response::Busy),
+        map.quota_exceeded.map(Response::QuotaExceeded),
         map.error.map(Response::Error),
     ];
     let mut found = found.into_iter().flatten();

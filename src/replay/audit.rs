@@ -56,6 +56,8 @@ pub struct Counts {
     pub records: u64,
     pub episodes: u64,
     pub utterances: u64,
+    /// Closed segments that were held against their records.
+    pub segments: u64,
     /// Commands that were decided again, utterances among them.
     pub reproposed: u64,
     pub reproposed_utterances: u64,
@@ -79,6 +81,7 @@ impl Counts {
             records,
             episodes,
             utterances,
+            segments,
             reproposed,
             reproposed_utterances,
             proposals_differ,
@@ -93,6 +96,7 @@ impl Counts {
         self.records += records;
         self.episodes += episodes;
         self.utterances += utterances;
+        self.segments += segments;
         self.reproposed += reproposed;
         self.reproposed_utterances += reproposed_utterances;
         self.proposals_differ += proposals_differ;

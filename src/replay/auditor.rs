@@ -1,12 +1,14 @@
 //! One stream under audit, record by record.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::audit::{Counts, Progress, Scrutiny, StreamReport};
+use super::evidence::{SegmentError, check_segment, newest_checkpoint};
 use super::origins::mind_origin;
 use super::{Difference, erasures, repropose};
-use crate::events::{Event, Record, Report, RetrainCompleted, TenantEvent};
+use crate::events::{Event, Record, Report, RetrainCompleted, SegmentClosed, TenantEvent};
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
@@ -118,7 +120,8 @@ impl<'a, D: Domain> Auditor<'a, D> {
     /// The tenant's own stream is folded by its own rules, and holds no mind.
     fn audit_tenant(mut self, progress: &dyn Progress) -> StreamReport {
         let mut registry = Registry::default();
-        if let Err(difference) = self.walk_tenant(&mut registry) {
+        let walked = self.walk_tenant(&mut registry);
+        if let Err(difference) = walked.and_then(|()| self.check_tree(&registry)) {
             self.note(difference);
         }
         progress.advance(self.counts.records);
@@ -148,6 +151,37 @@ impl<'a, D: Domain> Auditor<'a, D> {
             }
         }
         Ok(())
+    }
+
+    /// Holds each segment against the records it was closed over, and the tree against the newest
+    /// checkpoint that was given out.
+    fn check_tree(&mut self, registry: &Registry) -> Result<(), Difference> {
+        let tenant = &self.stream.tenant;
+        for segment in registry.segments() {
+            let closed = &segment.closed;
+            let differs = |what: &str, recorded: &dyn Display, found: &dyn Display| {
+                let SegmentClosed { stream, first, last, .. } = closed;
+                let field =
+                    format!("segment of stream {stream}, records {first} to {last}: {what}");
+                Difference::new(segment.seq.get(), &field, recorded, found)
+            };
+            self.counts.segments += 1;
+            match check_segment(&*self.store.log, tenant, closed, None) {
+                Ok(_) => {}
+                Err(SegmentError::Root { found }) => {
+                    return Err(differs("root", &closed.root, &found));
+                }
+                Err(SegmentError::Head { found }) => {
+                    return Err(differs("head", &closed.head, &found));
+                }
+                Err(error) => return Err(differs("records", &"all that it covers", &error)),
+            }
+        }
+        let signed = newest_checkpoint(self.store, tenant, registry);
+        let last = registry.head().seq;
+        signed.map(|_| ()).map_err(|error| {
+            Difference::new(last, "newest checkpoint", "what was signed and given out", error)
+        })
     }
 
     fn report(mut self, erased: bool) -> StreamReport {

@@ -6,6 +6,7 @@ mod audit;
 mod auditor;
 mod difference;
 mod erasures;
+mod evidence;
 mod minds;
 mod origins;
 mod rebuild;
@@ -13,6 +14,10 @@ mod repropose;
 
 pub use audit::{AuditReport, Counts, Progress, Scrutiny, StreamReport, audit, streams_of};
 pub use difference::{Difference, body};
+pub use evidence::{
+    CheckpointsError, ORIGIN, ProveError, SegmentError, Through, Wanted, check_segment,
+    due_segments, leaf_of, leaves_of, newest_checkpoint, prove, signer_of,
+};
 pub use minds::{Minds, Work};
 pub use origins::{keep_mind, mind_origin, state_origin};
 pub use rebuild::{RebuildError, keep_snapshot, mind_of, rebuild, rebuild_at};

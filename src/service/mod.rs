@@ -1,13 +1,14 @@
 //! The one place that wires a service together: store → actors → gateway. The binary starts it,
 //! and so does any program that wants the service inside itself (`examples/embed.rs`).
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
 use crate::actors::{
-    ActorsError, Erased, Failure, House, HouseSettings, OrderError, Registrar, Wakings,
+    ActorsError, Erased, Failure, House, HouseSettings, OrderError, Registrar, Usage, Wakings,
 };
 use crate::frontends::{
     Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
@@ -198,6 +199,11 @@ impl Service {
     /// What came through the doors.
     pub fn counts(&self) -> Counts {
         self.gateway.counters().now()
+    }
+
+    /// What each tenant takes, and how often it was turned away.
+    pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
+        self.house.usage()
     }
 
     /// People awake now.

@@ -3,8 +3,10 @@
 
 use std::sync::Arc;
 
-use super::{AppendError, EventLog, Keys, ReadError, Store};
-use crate::events::{Batch, Durable, Event, Head, Record, RetrainFailed, SessionClosed, encode};
+use super::{AppendError, EventLog, Keys, ReadError, SealedRecord, Store};
+use crate::events::{
+    Batch, Durable, Event, Head, Header, Record, RetrainFailed, SessionClosed, commitment, encode,
+};
 use crate::ids::{Digest, RequestId, Seq, StreamId, StreamKey, TenantId, Timestamp, UserId};
 use crate::limits::{BATCH_EVENTS_MAX, RECORD_BYTES_MAX, STORE_VALUE_BYTES_MAX};
 
@@ -31,6 +33,7 @@ const CHECKS: &[Check] = &[
     ("of two writers of one stream one wins", of_two_writers_one_wins),
     ("readers see whole records while others write", readers_see_whole_records),
     ("an erased person's stream is closed and keeps its head", an_erased_stream_is_closed),
+    ("sealed bytes are counted for each tenant", sealed_bytes_are_counted),
     ("everything is there after reopening", everything_is_there_after_reopening),
 ];
 
@@ -61,6 +64,31 @@ pub fn stream(keys: &Keys, tenant: &str, user: &str) -> StreamId {
     keys.make_tenant(&tenant).expect("the backend makes tenants");
     let user = UserId::new(user).expect("the suite names users well");
     keys.stream_id(&tenant, &user).expect("the tenant was just made")
+}
+
+fn sealed_bytes_are_counted(subject: Subject) {
+    let Subject { store, reopen } = subject;
+    let (ada, bob) = (stream(&store.keys, "one", "ada"), stream(&store.keys, "two", "bob"));
+    let count =
+        |store: &Store, who: &StreamId| store.log.sealed_bytes(&who.tenant).expect("counts");
+    assert_eq!(count(&store, &ada), 0);
+    let long = "x".repeat(3 * STORE_VALUE_BYTES_MAX);
+    let first = append(&*store.log, &ada, Head::EMPTY, batch(["a", &long])).head();
+    let two = count(&store, &ada);
+    let bare = 2 * Header::BYTES + long.len();
+    assert!((bare as u64..bare as u64 + 400).contains(&two), "{two} bytes for {bare}");
+    append(&*store.log, &bob, Head::EMPTY, batch(["b"]));
+    append(&*store.log, &ada, first, batch(["c"]));
+    let (three, one) = (count(&store, &ada), count(&store, &bob));
+    assert!(three > two && one < 400 && one > Header::BYTES as u64, "{two}, {three}, {one}");
+    let Some(reopen) = reopen else { return };
+    drop(store);
+    let store = reopen();
+    // Asked for the first time after something came on top.
+    append(&*store.log, &bob, store.log.head(&bob).expect("a head"), batch(["d"]));
+    assert_eq!(count(&store, &ada), three);
+    assert!(count(&store, &bob) > one, "{} after {one}", count(&store, &bob));
+    assert!(count(&store, &bob) < 2 * one + 8);
 }
 
 /// Reads a stream to its end and insists on the laws that a reader relies on.
@@ -171,6 +199,21 @@ fn a_read_starts_anywhere(subject: Subject) {
         let records: Vec<Record> = records.map(|record| record.expect("it reads")).collect();
         let skipped = usize::try_from(from - 1).expect("a small number").min(all.len());
         assert_eq!(records, all[skipped..], "from {from}");
+        let sealed = log.sealed(&ada, Seq::new(from).expect("from 1 on")).expect("it reads");
+        let sealed: Vec<SealedRecord> = sealed.map(|record| record.expect("it reads")).collect();
+        let key = keys.user_key(&ada).expect("she is here");
+        let opened: Vec<(Seq, Digest)> =
+            sealed.iter().map(|record| (record.header.seq, record.digest)).collect();
+        let wanted: Vec<(Seq, Digest)> =
+            records.iter().map(|record| (record.seq, record.digest)).collect();
+        assert_eq!(opened, wanted, "sealed, from {from}");
+        for (sealed, record) in sealed.iter().zip(&records) {
+            assert_eq!(Digest::of(&sealed.frame), sealed.digest);
+            let body = &sealed.frame[Header::BYTES..];
+            let (salt, body) = key.reveal(&sealed.header, body).expect("it is hers");
+            assert_eq!(body, encode(&record.event));
+            assert_eq!(commitment(&salt, &body), sealed.header.commitment);
+        }
     }
 }
 
@@ -304,6 +347,9 @@ fn an_erased_stream_is_closed(subject: Subject) {
     assert!(matches!(log.read(&ada, Seq::FIRST).map(|_| ()), Err(ReadError::Erased)));
     assert_eq!(log.append(&ada, head, batch(["c"])).wait(), Err(AppendError::Erased));
     assert_eq!(log.head(&ada), Ok(head));
+    let sealed = log.sealed(&ada, Seq::FIRST).expect("that needs no key");
+    let sealed: Vec<Digest> = sealed.map(|record| record.expect("it reads").digest).collect();
+    assert_eq!(sealed, [head.digest]);
     assert_eq!(reasons(&read_all(&**log, &grace)), ["b"]);
 }
 

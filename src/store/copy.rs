@@ -8,7 +8,7 @@ use super::files::make_dir;
 use super::layout::{Former, LAYOUT, LAYOUT_FILE, Standing, bring_up, standing};
 use super::open::{lock_existing, open_log};
 use super::sled::SledCache;
-use super::{Entropy, Keys, OpenError, OsEntropy, Store};
+use super::{CheckpointFeed, Entropy, Keys, OpenError, OsEntropy, Store};
 
 /// A copy of a data directory's log and caches, for tools that only look: they never open the
 /// directory itself, which opening would write to. Removed when dropped.
@@ -109,7 +109,10 @@ impl PrivateCopy {
             let former = Former { dir: &self.dir, log: &log, keys: &keys, cache: &cache };
             bring_up(&former, from, |_| Ok(()))?;
         }
-        Ok(Store::of(Arc::new(log), Arc::new(cache), keys))
+        // Read where they are, like the keys.
+        let mut store = Store::of(Arc::new(log), Arc::new(cache), keys);
+        store.checkpoints = Arc::new(CheckpointFeed::of(&self.of, false));
+        Ok(store)
     }
 }
 

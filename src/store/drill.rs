@@ -6,7 +6,7 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::log::{EventLog, Pending, ReadError};
+use super::log::{EventLog, Pending, ReadError, SealedRecords};
 use super::{FaultPlan, FaultyLog, Store};
 use crate::events::{Batch, Head, Record};
 use crate::ids::{Seq, StreamId, TenantId};
@@ -91,6 +91,10 @@ impl EventLog for Drill {
         self.faulty.read(stream, from)
     }
 
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        self.faulty.sealed(stream, from)
+    }
+
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.faulty.head(stream)
     }
@@ -101,6 +105,10 @@ impl EventLog for Drill {
 
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.faulty.walk(stream)
+    }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.faulty.sealed_bytes(tenant)
     }
 
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {

@@ -117,7 +117,7 @@ pub fn export(dir: &Path, tenant: &TenantId, path: &Path) -> Result<Exported, Ex
             rescue.walk(&stream, |_, frame| {
                 out.frame(RECORD, &[frame]).map_err(|error| failed(path, &error))
             })?;
-            exported.people += 1;
+            exported.people += u64::from(!stream.is_tenants());
             exported.records += head.seq;
         }
         let (frames, digest) = (out.frames.to_be_bytes(), *out.hasher.finalize().as_bytes());

@@ -2,7 +2,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Deserialize;
 
-use super::log::{AppendError, EventLog, Pending, Promise, ReadError};
+use super::log::{AppendError, EventLog, Pending, Promise, ReadError, SealedRecords};
 use super::{Entropy, SeededEntropy};
 use crate::events::{Batch, Head, Record};
 use crate::ids::{Seq, StreamId, TenantId};
@@ -218,6 +218,11 @@ impl EventLog for FaultyLog {
         self.inner.read(stream, from)
     }
 
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        self.alive()?;
+        self.inner.sealed(stream, from)
+    }
+
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.alive()?;
         self.inner.head(stream)
@@ -236,6 +241,11 @@ impl EventLog for FaultyLog {
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.alive()?;
         self.inner.walk(stream)
+    }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.alive()?;
+        self.inner.sealed_bytes(tenant)
     }
 }
 

@@ -116,7 +116,7 @@ fn prove(path: &Path, secret: &[u8], key_file: &Path) -> Result<Imported, Import
                 if let Some(wrapped) = wrapped {
                     keys.unwrap(&stream, &wrapped, key_file).map_err(bad_key)?;
                 }
-                counts.people += 1;
+                counts.people += u64::from(!stream.is_tenants());
                 person = Some((Walk::after(key, Head::EMPTY), head));
             }
             Frame::Record(bytes) => {

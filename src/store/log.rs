@@ -4,8 +4,8 @@ use std::task::{Context, Poll};
 
 use tokio::sync::oneshot;
 
-use crate::events::{Batch, DecodeError, Durable, Head, HeaderError, Record};
-use crate::ids::{Seq, StreamId, TenantId};
+use crate::events::{Batch, DecodeError, Durable, Head, Header, HeaderError, Record};
+use crate::ids::{Digest, Seq, StreamId, TenantId};
 
 /// The port: one total order per stream, no promise across streams. Any backend passes
 /// `store::conformance`.
@@ -31,11 +31,33 @@ pub trait EventLog: Send + Sync {
     /// The tenants that have at least one stream, in the order of their names.
     fn tenants(&self) -> Result<Vec<TenantId>, ReadError>;
 
+    /// The records from `from` on, sealed as they are kept, in order, as they stand now. Each is
+    /// checked as it is read in all that needs no key: it works for whoever has none, and for a
+    /// person who was erased. A damaged record is one error, and the last item.
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError>;
+
     /// Walks a stream without opening a body: checksums, dense sequence, chain. What is left to
     /// check of a person who was erased.
     ///
     /// - returns: the last record.
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError>;
+
+    /// Bytes of all framed records of a tenant that are durable. The first call may read all of
+    /// them; later ones cost nothing.
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError>;
+}
+
+/// What [`EventLog::sealed`] gives.
+pub type SealedRecords<'a> = Box<dyn Iterator<Item = Result<SealedRecord, ReadError>> + 'a>;
+
+/// A record as it is kept: whoever has it can compute its digest, and nobody without the person's
+/// key can read it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SealedRecord {
+    pub header: Header,
+    pub digest: Digest,
+    /// Header and sealed body, what the digest is over.
+    pub frame: Vec<u8>,
 }
 
 /// The end of a promise that keeps it.

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, RwLock};
 
-use super::log::{Pending, ReadError};
+use super::log::{Pending, ReadError, SealedRecords};
 use super::sealing::before;
 use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
 use crate::events::{Batch, Durable, Head, Header, Record};
@@ -13,16 +13,38 @@ use crate::ids::{Seq, StreamId, StreamKey, TenantId};
 pub struct MemoryLog {
     keys: Arc<Keys>,
     streams: RwLock<BTreeMap<TenantId, BTreeMap<StreamKey, Stream>>>,
+    /// Of all frames of a tenant.
+    bytes: RwLock<BTreeMap<TenantId, u64>>,
 }
 
 struct Stream {
     head: Head,
-    frames: Vec<Arc<[u8]>>,
+    frames: Frames,
+}
+
+type Frames = Vec<Arc<[u8]>>;
+
+impl Stream {
+    /// The frames from record `from` on as they stand now, and a walk that begins there. They are
+    /// shared, so a later append does not show up here.
+    fn from(&self, key: StreamKey, from: Seq) -> Result<(Walk, Frames), ReadError> {
+        let start = usize::try_from(from.get() - 1).unwrap_or(usize::MAX).min(self.frames.len());
+        let last = match before(from).and_then(|_| self.frames[..start].last()) {
+            None => Head::EMPTY,
+            Some(frame) => {
+                let seq = start as u64;
+                let (header, _, digest) =
+                    Header::unframe(frame).map_err(|error| ReadError::Header { seq, error })?;
+                Head { seq: header.seq.get(), digest }
+            }
+        };
+        Ok((Walk::after(key, last), self.frames[start..].to_vec()))
+    }
 }
 
 impl MemoryLog {
     pub fn new(keys: Arc<Keys>) -> MemoryLog {
-        MemoryLog { keys, streams: RwLock::default() }
+        MemoryLog { keys, streams: RwLock::default(), bytes: RwLock::default() }
     }
 
     fn append_now(
@@ -46,6 +68,8 @@ impl MemoryLog {
                 .entry(stream.key)
                 .or_insert_with(|| Stream { head: Head::EMPTY, frames: Vec::new() });
             kept.head = sealed.head;
+            let mut bytes = self.bytes.write().expect("no append panics while it holds the count");
+            *bytes.entry(stream.tenant.clone()).or_default() += sealed.bytes();
             kept.frames.extend(sealed.frames.into_iter().map(Arc::from));
         }
         Ok(Durable::mint(sealed.records, sealed.head))
@@ -66,19 +90,7 @@ impl EventLog for MemoryLog {
         let kept = streams.get(&stream.tenant).and_then(|tenant| tenant.get(&stream.key));
         let Some(kept) = kept else { return Ok(Box::new(std::iter::empty())) };
         let key = checks::key_to_read(&self.keys, stream)?;
-        // As they stand now: the frames are shared, so a later append does not show up here.
-        let start = usize::try_from(from.get() - 1).unwrap_or(usize::MAX).min(kept.frames.len());
-        let frames = kept.frames[start..].to_vec();
-        let last = match before(from).and_then(|_| kept.frames[..start].last()) {
-            None => Head::EMPTY,
-            Some(frame) => {
-                let seq = start as u64;
-                let (header, _, digest) =
-                    Header::unframe(frame).map_err(|error| ReadError::Header { seq, error })?;
-                Head { seq: header.seq.get(), digest }
-            }
-        };
-        let mut walk = Walk::after(stream.key, last);
+        let (mut walk, frames) = kept.from(stream.key, from)?;
         let mut failed = false;
         Ok(Box::new(frames.into_iter().map_while(move |frame| {
             if failed {
@@ -87,6 +99,17 @@ impl EventLog for MemoryLog {
             let record = walk.open(&key, &frame);
             failed = record.is_err();
             Some(record)
+        })))
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        let streams = self.streams.read().expect("no append panics while it holds the log");
+        let kept = streams.get(&stream.tenant).and_then(|tenant| tenant.get(&stream.key));
+        let Some(kept) = kept else { return Ok(Box::new(std::iter::empty())) };
+        let (mut walk, frames) = kept.from(stream.key, from)?;
+        let mut failed = false;
+        Ok(Box::new(frames.into_iter().map_while(move |frame| {
+            (!failed).then(|| walk.sealed(frame.to_vec())).inspect(|read| failed = read.is_err())
         })))
     }
 
@@ -115,5 +138,10 @@ impl EventLog for MemoryLog {
             walk.step(frame)?;
         }
         Ok(walk.last())
+    }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        let bytes = self.bytes.read().expect("no append panics while it holds the count");
+        Ok(bytes.get(tenant).copied().unwrap_or(0))
     }
 }

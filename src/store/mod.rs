@@ -2,6 +2,7 @@
 
 mod cache;
 mod check;
+mod checkpoints;
 mod checks;
 mod closed;
 pub mod conformance;
@@ -28,6 +29,7 @@ mod sled;
 mod snapshots;
 
 pub use self::check::{CHECK_COMMAND, check_copy, check_with};
+pub use self::checkpoints::{CheckpointFeed, FeedError};
 pub use self::copy::{PrivateCopy, copy_private};
 pub use self::entropy::{Entropy, OsEntropy, SeededEntropy};
 pub use self::export::{ExportError, Exported, export, key_file_of};
@@ -35,7 +37,7 @@ pub use self::faulty::{Fault, FaultPlan, FaultyLog};
 pub use self::import::{ImportError, Imported, import};
 pub use self::keys::{KeyError, Keys};
 pub use self::layout::LAYOUT;
-pub use self::log::{AppendError, EventLog, Pending, ReadError};
+pub use self::log::{AppendError, EventLog, Pending, ReadError, SealedRecord, SealedRecords};
 pub use self::memory::MemoryLog;
 pub use self::models::ModelStore;
 pub use self::open::{HISTORY_FILE, OpenError, Store, open, open_memory};

@@ -11,7 +11,8 @@ use super::import;
 use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
 use super::sled::{LogError, SledCache};
 use super::{
-    Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog, SnapshotStore,
+    CheckpointFeed, Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog,
+    SnapshotStore,
 };
 use crate::ids::{StreamId, TenantId};
 
@@ -24,6 +25,7 @@ pub struct Store {
     pub models: Arc<ModelStore>,
     pub snapshots: Arc<SnapshotStore>,
     pub keys: Arc<Keys>,
+    pub checkpoints: Arc<CheckpointFeed>,
     /// Where it is kept; none in memory.
     directory: Option<Arc<Path>>,
 }
@@ -148,7 +150,8 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
         }
     }
     let store = Store::of(Arc::new(log), Arc::new(cache), keys);
-    Ok(Store { directory: Some(Arc::from(dir)), ..store })
+    let checkpoints = Arc::new(CheckpointFeed::of(dir, true));
+    Ok(Store { checkpoints, directory: Some(Arc::from(dir)), ..store })
 }
 
 /// A store that ends with the process, for tests and for embedding without a disk.
@@ -162,7 +165,8 @@ impl Store {
     pub(super) fn of(log: Arc<dyn EventLog>, cache: Arc<dyn Cache>, keys: Arc<Keys>) -> Store {
         let models = Arc::new(ModelStore::new(cache.clone(), keys.clone()));
         let snapshots = Arc::new(SnapshotStore::new(cache, keys.clone()));
-        Store { log, models, snapshots, keys, directory: None }
+        let checkpoints = Arc::default();
+        Store { log, models, snapshots, keys, checkpoints, directory: None }
     }
 
     /// The same store with another log in front.

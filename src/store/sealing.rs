@@ -2,7 +2,7 @@ use chacha20poly1305::aead::{Aead, KeyInit, Payload};
 use chacha20poly1305::{XChaCha20Poly1305, XNonce};
 use zeroize::{Zeroize, ZeroizeOnDrop};
 
-use super::{AppendError, Entropy, ReadError};
+use super::{AppendError, Entropy, ReadError, SealedRecord};
 use crate::events::{Batch, Event, Head, Header, Record, commitment, decode, encode};
 use crate::ids::{Digest, RequestId, Seq, StreamKey, Timestamp};
 use crate::limits::{BATCH_BYTES_MAX, BATCH_EVENTS_MAX, RECORD_BYTES_MAX};
@@ -57,6 +57,29 @@ impl DataKey {
         let (nonce, text) = sealed.split_at_checked(NONCE_BYTES)?;
         let payload = Payload { msg: text, aad: bound };
         XChaCha20Poly1305::new((&self.0).into()).decrypt(XNonce::from_slice(nonce), payload).ok()
+    }
+
+    /// Opens a record's sealed body: the salt and the body that its header commits to. Whoever is
+    /// given both can read this record and no other.
+    ///
+    /// - errors: [`ReadError::Seal`]: another key, or other bytes than were sealed.
+    pub fn reveal(
+        &self,
+        header: &Header,
+        sealed: &[u8],
+    ) -> Result<([u8; SALT_BYTES], Vec<u8>), ReadError> {
+        let seq = header.seq.get();
+        let wrong = |reason: &str| ReadError::Seal { seq, reason: reason.to_owned() };
+        let plain = self
+            .open(&bound_bytes(header), sealed)
+            .ok_or_else(|| wrong("the seal does not fit the key, the header or the bytes"))?;
+        let (salt, body) = plain
+            .split_first_chunk::<SALT_BYTES>()
+            .ok_or_else(|| wrong("the sealed text is shorter than its salt"))?;
+        if commitment(salt, body) != header.commitment {
+            return Err(wrong("the body is not the one that the header commits to"));
+        }
+        Ok((*salt, body.to_vec()))
     }
 }
 
@@ -156,6 +179,13 @@ pub struct Sealed {
     pub head: Head,
 }
 
+impl Sealed {
+    /// Bytes of all frames.
+    pub fn bytes(&self) -> u64 {
+        self.frames.iter().map(|frame| frame.len() as u64).sum()
+    }
+}
+
 fn bound_bytes(header: &Header) -> Vec<u8> {
     let mut bytes = header.frame(&[]);
     bytes.truncate(BOUND_BYTES);
@@ -205,21 +235,18 @@ impl Walk {
         Ok((header, sealed))
     }
 
+    /// As [`Walk::step`], for whoever keeps the frame.
+    pub(super) fn sealed(&mut self, frame: Vec<u8>) -> Result<SealedRecord, ReadError> {
+        let (header, _) = self.step(&frame)?;
+        Ok(SealedRecord { header, digest: self.last.digest, frame })
+    }
+
     /// Checks everything and opens the body.
     pub fn open(&mut self, key: &DataKey, frame: &[u8]) -> Result<Record, ReadError> {
         let (header, sealed) = self.step(frame)?;
         let seq = header.seq.get();
-        let wrong = |reason: &str| ReadError::Seal { seq, reason: reason.to_owned() };
-        let plain = key
-            .open(&bound_bytes(&header), sealed)
-            .ok_or_else(|| wrong("the seal does not fit the key, the header or the bytes"))?;
-        let (salt, body) = plain
-            .split_first_chunk::<SALT_BYTES>()
-            .ok_or_else(|| wrong("the sealed text is shorter than its salt"))?;
-        if commitment(salt, body) != header.commitment {
-            return Err(wrong("the body is not the one that the header commits to"));
-        }
-        let event = decode(header.kind, header.version, body);
+        let (_, body) = key.reveal(&header, sealed)?;
+        let event = decode(header.kind, header.version, &body);
         Ok(Record {
             seq: header.seq,
             at: header.at,

@@ -5,6 +5,7 @@ mod cache;
 mod check;
 mod commit;
 mod read;
+mod sizes;
 #[cfg(test)]
 mod tests;
 mod watch;
@@ -17,21 +18,23 @@ pub(super) use self::read::{KEY_BYTES, chunk_key};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use self::commit::{Committer, Job, Syncer};
-use self::read::{Records, frame_at, last_seqs};
+use self::read::{Frames, Records, frame_at, last_seqs};
+use self::sizes::Sizes;
 use self::watch::{InHand, Watch};
 use super::closed::{ClosedMark, Part};
 use super::heads::{Heads, HeadsFile, HeadsRead};
-use super::log::{Pending, ReadError};
+use super::log::{Pending, ReadError, SealedRecords};
 use super::quiet::guarded;
 use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
 use crate::events::{Batch, Head, Header, Record};
+use crate::fairness::Room;
 use crate::ids::{Seq, StreamId, StreamKey, TenantId};
 use crate::limits::{COMMIT_QUEUE_BYTES_MAX, COMMIT_QUEUE_MAX, COMMIT_S_MAX};
 
@@ -66,17 +69,20 @@ struct Shared {
     /// What is durable. Readers see nothing beyond it.
     heads: RwLock<Heads>,
     poisoned: OnceLock<String>,
+    /// What stands in the committer's queue.
     waiting: Waiting,
+    sizes: Sizes,
     in_hand: InHand,
     /// A group was given up; the committer may never come back from it.
     hangs: AtomicBool,
 }
 
-/// What stands in the committer's queue.
-#[derive(Default)]
-struct Waiting {
-    batches: AtomicUsize,
-    bytes: AtomicUsize,
+/// Room for batches that wait for the committer.
+struct Waiting(Mutex<WaitingRooms>);
+
+struct WaitingRooms {
+    batches: Room,
+    bytes: Room,
 }
 
 /// Something that was there and is not any more, found when a log is opened.
@@ -169,13 +175,15 @@ impl SledLog {
         let shared = Arc::new(Shared {
             db,
             keys,
+            sizes: Sizes::new(heads.clone()),
             heads: RwLock::new(heads),
             poisoned: OnceLock::new(),
-            waiting: Waiting::default(),
+            waiting: Waiting::new(),
             in_hand: InHand::default(),
             hangs: AtomicBool::new(false),
         });
-        let (sender, receiver) = sync_channel(COMMIT_QUEUE_MAX);
+        // Never full: the rooms for what waits are smaller.
+        let (sender, receiver) = sync_channel(2 * COMMIT_QUEUE_MAX);
         let (ending, ended) = sync_channel(0);
         let committer = Committer::new(shared.clone(), heads_file, sync);
         let committer = std::thread::Builder::new()
@@ -188,6 +196,25 @@ impl SledLog {
         let _watch = Watch::start(shared.clone(), patience).map_err(LogError::Io)?;
         let (sender, committer, ended) = (Some(sender), Some(committer), Mutex::new(ended));
         Ok(SledLog { shared, sender, committer, ended, _watch, mark: None, _lock: None })
+    }
+
+    /// Where to read from record `from` on: a walk that begins there, and the end; none when there
+    /// is no such record.
+    fn from(
+        &self,
+        stream: &StreamId,
+        from: Seq,
+    ) -> Result<Option<(::sled::Tree, Walk, Head)>, ReadError> {
+        let head = self.shared.head(stream);
+        if from.get() > head.seq {
+            return Ok(None);
+        }
+        let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
+        let last = match super::sealing::before(from) {
+            None => Head::EMPTY,
+            Some(before) => head_at(&tree, stream.key, before)?,
+        };
+        Ok(Some((tree, Walk::after(stream.key, last), head)))
     }
 
     /// The sentence that poisoned the log, if one did.
@@ -236,17 +263,14 @@ impl EventLog for SledLog {
         let (promise, pending) = Pending::promise();
         let job = Job { stream: stream.clone(), after, draft, promise };
         let sender = self.sender.as_ref().expect("only dropping the log takes it");
-        let waiting = self.shared.waiting.add(bytes);
-        let sent = match waiting.bytes > COMMIT_QUEUE_BYTES_MAX {
-            true => Err(TrySendError::Full(job)),
-            false => sender.try_send(job),
-        };
-        if let Err(refused) = sent {
-            self.shared.waiting.remove(1, bytes);
+        if let Err(waiting) = self.shared.waiting.add(&stream.tenant, bytes) {
+            job.answer(Err(AppendError::Busy { waiting }));
+            return pending;
+        }
+        if let Err(refused) = sender.try_send(job) {
+            let waiting = self.shared.waiting.remove(&stream.tenant, bytes);
             match refused {
-                TrySendError::Full(job) => {
-                    job.answer(Err(AppendError::Busy { waiting: waiting.batches - 1 }));
-                }
+                TrySendError::Full(job) => job.answer(Err(AppendError::Busy { waiting })),
                 TrySendError::Disconnected(job) => job.answer(Err(AppendError::Gone)),
             }
         }
@@ -258,18 +282,20 @@ impl EventLog for SledLog {
         stream: &StreamId,
         from: Seq,
     ) -> Result<Box<dyn Iterator<Item = Result<Record, ReadError>> + 'a>, ReadError> {
-        let head = self.shared.head(stream);
-        if from.get() > head.seq {
-            return Ok(Box::new(std::iter::empty()));
+        match self.from(stream, from)? {
+            None => Ok(Box::new(std::iter::empty())),
+            Some((tree, walk, head)) => {
+                let key = checks::key_to_read(&self.shared.keys, stream)?;
+                Ok(Box::new(Records::new(&tree, key, walk, head)))
+            }
         }
-        let key = checks::key_to_read(&self.shared.keys, stream)?;
-        let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
-        let last = match super::sealing::before(from) {
-            None => Head::EMPTY,
-            Some(before) => head_at(&tree, stream.key, before)?,
-        };
-        let walk = Walk::after(stream.key, last);
-        Ok(Box::new(Records::new(&tree, key, walk, head)))
+    }
+
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        match self.from(stream, from)? {
+            None => Ok(Box::new(std::iter::empty())),
+            Some((tree, walk, head)) => Ok(Box::new(Frames::new(&tree, walk, head))),
+        }
     }
 
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {
@@ -294,24 +320,45 @@ impl EventLog for SledLog {
         let tree = guarded(|| self.shared.tree(&stream.tenant)).map_err(store_error)??;
         read::walk(&tree, stream.key, head)
     }
-}
 
-/// A reading of [`Waiting`].
-struct Queue {
-    batches: usize,
-    bytes: usize,
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.shared
+            .sizes
+            .of(tenant, || guarded(|| self.shared.tree(tenant)).map_err(store_error)?)
+    }
 }
 
 impl Waiting {
-    /// Counts one more batch; returns what stands there with it.
-    fn add(&self, bytes: usize) -> Queue {
-        let batches = self.batches.fetch_add(1, Ordering::Relaxed) + 1;
-        Queue { batches, bytes: self.bytes.fetch_add(bytes, Ordering::Relaxed) + bytes }
+    fn new() -> Waiting {
+        let batches = Room::new(COMMIT_QUEUE_MAX);
+        Waiting(Mutex::new(WaitingRooms { batches, bytes: Room::new(COMMIT_QUEUE_BYTES_MAX) }))
     }
 
-    fn remove(&self, batches: usize, bytes: usize) {
-        self.batches.fetch_sub(batches, Ordering::Relaxed);
-        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
+    /// Makes room for one more batch of a tenant.
+    ///
+    /// - errors: there is none; the batches that wait.
+    fn add(&self, tenant: &TenantId, bytes: usize) -> Result<(), usize> {
+        let mut rooms = self.rooms();
+        if !rooms.batches.take(tenant, 1) {
+            return Err(rooms.batches.total());
+        }
+        if !rooms.bytes.take(tenant, bytes) {
+            rooms.batches.give_back(tenant, 1);
+            return Err(rooms.batches.total());
+        }
+        Ok(())
+    }
+
+    /// - returns: the batches that wait now.
+    fn remove(&self, tenant: &TenantId, bytes: usize) -> usize {
+        let mut rooms = self.rooms();
+        rooms.batches.give_back(tenant, 1);
+        rooms.bytes.give_back(tenant, bytes);
+        rooms.batches.total()
+    }
+
+    fn rooms(&self) -> MutexGuard<'_, WaitingRooms> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

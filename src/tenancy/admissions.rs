@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use super::Standing;
-use crate::events::Role;
+use crate::events::{Quotas, Role};
 use crate::ids::{PublicKey, TenantId, Timestamp};
 
 /// Which key comes in as whom, for everybody who opens doors. One writer keeps it up to date with
@@ -46,6 +46,12 @@ impl Admissions {
         others
             .find(|(_, standing)| standing.keys().contains_key(key))
             .map(|(other, _)| other.clone())
+    }
+
+    /// What a tenant may take; the default for one that no order was about.
+    pub fn quotas(&self, tenant: &TenantId) -> Quotas {
+        let all = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        all.get(tenant).map(|standing| *standing.quotas()).unwrap_or_default()
     }
 
     /// A tenant as it stands.

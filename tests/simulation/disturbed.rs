@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use apprentice::events::{Batch, Head, Record};
 use apprentice::ids::{Seq, StreamId, TenantId};
-use apprentice::store::{EventLog, FaultyLog, Pending, ReadError};
+use apprentice::store::{EventLog, FaultyLog, Pending, ReadError, SealedRecords};
 
 const NEVER: usize = usize::MAX;
 
@@ -51,6 +51,11 @@ impl EventLog for Disturbed {
         Ok(Box::new(records.map(|record| self.read_one().and(record))))
     }
 
+    fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError> {
+        let records = self.inner.sealed(stream, from)?;
+        Ok(Box::new(records.map(|record| self.read_one().and(record))))
+    }
+
     fn head(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.inner.head(stream)
     }
@@ -61,6 +66,10 @@ impl EventLog for Disturbed {
 
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError> {
         self.inner.walk(stream)
+    }
+
+    fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError> {
+        self.inner.sealed_bytes(tenant)
     }
 
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {

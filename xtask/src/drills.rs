@@ -24,6 +24,16 @@ pub fn powerloss(images: u64, seed: Option<u64>) -> Result<(), String> {
     faults("after_a_power_cut", "APPRENTICE_IMAGES", images, seed)
 }
 
+/// Flips so many bits of a closed directory, one at a time; the first that was neither harmless nor
+/// reported is printed.
+pub fn damage(flips: u64, seed: Option<u64>) -> Result<(), String> {
+    let (flips, seed) = (flips.to_string(), seed.map(|seed| seed.to_string()));
+    let mut environment = vec![("APPRENTICE_FLIPS", &*flips)];
+    environment.extend(seed.as_deref().map(|seed| ("APPRENTICE_SEED", seed)));
+    let test = ["test", "--release", "--test", "damage", "--", "--nocapture", "a_flipped_bit"];
+    run_with(&environment, "cargo", &test)
+}
+
 fn faults(test: &str, variable: &str, count: u64, seed: Option<u64>) -> Result<(), String> {
     let (count, seed) = (count.to_string(), seed.map(|seed| seed.to_string()));
     // A long run that skips what it was started for has failed.

@@ -79,12 +79,12 @@ pub fn qemu() -> Result<(), String> {
     debian("qemu-user", || answers("qemu-x86_64", &["--version"]))
 }
 
-/// A Python with the packages of the wire's example, in `target/python`.
+/// A Python with the packages of the wire's example and of the second reader of proofs, in `target/python`.
 pub fn python() -> Result<PathBuf, String> {
     let folder = root().join("target/python");
     let python = folder.join("bin/python");
     let path = python.display().to_string();
-    if answers(&path, &["-c", "import zmq, msgpack"]) {
+    if answers(&path, &["-c", "import zmq, msgpack, cryptography"]) {
         return Ok(python);
     }
     let made = run("python3", &["-m", "venv", &folder.display().to_string()]);
@@ -92,7 +92,8 @@ pub fn python() -> Result<PathBuf, String> {
         debian("python3-venv", || answers("python3", &["-c", "import ensurepip"]))?;
         run("python3", &["-m", "venv", &folder.display().to_string()])?;
     }
-    run(&path, &["-m", "pip", "install", "--quiet", "pyzmq==27.1.0", "msgpack==1.1.2"])?;
+    let packages = ["pyzmq==27.1.0", "msgpack==1.1.2", "cryptography==46.0.3"];
+    run(&path, &[&["-m", "pip", "install", "--quiet"], &packages[..]].concat())?;
     Ok(python)
 }
 

@@ -56,6 +56,16 @@ enum Task {
         #[arg(long)]
         seed: Option<u64>,
     },
+    /// A closed directory damaged: as many flipped bits as wanted, in the release build.
+    ///
+    /// Example: cargo xtask damage --flips 20000
+    Damage {
+        #[arg(long)]
+        flips: u64,
+        /// As an earlier run printed it; drawn when left out.
+        #[arg(long)]
+        seed: Option<u64>,
+    },
     /// The benchmarks behind docs/performance.md.
     Bench {
         /// Passed to `cargo bench`.
@@ -69,6 +79,7 @@ fn main() -> ExitCode {
         Task::Simulate { seeds, seed } => drills::simulate(seeds.unwrap_or(1), seed),
         Task::Crash { kills, seed } => drills::crash(kills, seed),
         Task::Powerloss { images, seed } => drills::powerloss(images, seed),
+        Task::Damage { flips, seed } => drills::damage(flips, seed),
         Task::Bench { filter } => stage::bench(filter.as_deref()),
     };
     match done {

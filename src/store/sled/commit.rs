@@ -6,6 +6,7 @@ use std::sync::mpsc::Receiver;
 use super::Shared;
 use super::read::{chunk_key, chunks};
 use crate::events::{Durable, Head};
+use crate::fairness::Turns;
 use crate::ids::{StreamId, TenantId};
 use crate::limits::{COMMIT_GROUP_BYTES_MAX, COMMIT_GROUP_MAX};
 use crate::sabotage;
@@ -41,9 +42,15 @@ pub(super) struct Committer {
     sync: Syncer,
 }
 
+fn queue(turns: &mut Turns<Job>, job: Job) {
+    let tenant = job.stream.tenant.clone();
+    turns.push(&tenant, job);
+}
+
 /// What one group will have done once it is durable.
 #[derive(Default)]
 struct Group {
+    bytes: BTreeMap<TenantId, u64>,
     writes: BTreeMap<TenantId, ::sled::Batch>,
     heads: BTreeMap<StreamId, Head>,
     kept: Vec<(Promise, Durable)>,
@@ -56,15 +63,21 @@ impl Committer {
 
     /// Commits until the log is dropped.
     pub(super) fn run(mut self, jobs: &Receiver<Job>) {
-        while let Ok(first) = jobs.recv() {
-            let mut group = vec![first];
-            let mut bytes = group[0].draft.bytes();
+        // Tenants take turns: one that has thousands of batches waiting fills no group alone.
+        let mut turns = Turns::default();
+        loop {
+            if turns.is_empty() {
+                let Ok(first) = jobs.recv() else { return };
+                queue(&mut turns, first);
+            }
+            jobs.try_iter().for_each(|job| queue(&mut turns, job));
+            let (mut group, mut bytes) = (Vec::new(), 0);
             while group.len() < COMMIT_GROUP_MAX && bytes < COMMIT_GROUP_BYTES_MAX {
-                let Ok(job) = jobs.try_recv() else { break };
+                let Some(job) = turns.pop() else { break };
                 bytes += job.draft.bytes();
+                self.shared.waiting.remove(&job.stream.tenant, job.draft.bytes());
                 group.push(job);
             }
-            self.shared.waiting.remove(group.len(), bytes);
             self.commit(group);
         }
     }
@@ -75,7 +88,7 @@ impl Committer {
             jobs.into_iter().for_each(|job| job.answer(Err(poisoned.clone())));
             return;
         }
-        let Group { writes, heads, kept } = self.gather(jobs);
+        let Group { bytes, writes, heads, kept } = self.gather(jobs);
         let (promises, receipts): (Vec<Promise>, Vec<Durable>) = kept.into_iter().unzip();
         let shared = self.shared.clone();
         let hold = shared.in_hand.hold(promises);
@@ -86,6 +99,9 @@ impl Committer {
         match durable {
             Ok(()) => {
                 self.publish(heads);
+                for (tenant, bytes) in bytes {
+                    shared.sizes.add(&tenant, bytes);
+                }
                 for (promise, receipt) in promises.into_iter().zip(receipts) {
                     let _ = promise.send(Ok(receipt));
                 }
@@ -126,6 +142,7 @@ impl Committer {
             };
             let sealed = draft.seal(&key, self.shared.keys.entropy(), stream.key, after);
             if !sealed.frames.is_empty() {
+                *group.bytes.entry(stream.tenant.clone()).or_default() += sealed.bytes();
                 let writes = group.writes.entry(stream.tenant.clone()).or_default();
                 for (record, frame) in sealed.records.iter().zip(&sealed.frames) {
                     for (chunk, value) in chunks(frame) {

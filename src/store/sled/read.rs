@@ -1,6 +1,6 @@
 use super::super::log::ReadError;
 use super::super::quiet::guarded;
-use super::super::{DataKey, Walk};
+use super::super::{DataKey, SealedRecord, Walk};
 use super::sentence;
 use crate::events::{Head, Record};
 use crate::ids::{Digest, Seq, StreamKey};
@@ -17,7 +17,7 @@ pub(in super::super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u
     key
 }
 
-fn parse_key(bytes: &[u8]) -> Option<(StreamKey, u64, u16)> {
+pub(super) fn parse_key(bytes: &[u8]) -> Option<(StreamKey, u64, u16)> {
     let bytes: &[u8; KEY_BYTES] = bytes.try_into().ok()?;
     let (stream, rest) = bytes.split_first_chunk()?;
     let (seq, chunk) = rest.split_first_chunk()?;
@@ -92,36 +92,55 @@ pub(super) fn last_seqs(tree: &::sled::Tree) -> Result<Vec<(StreamKey, u64)>, St
 
 /// Checks all that needs no key, up to the record `end`.
 pub(super) fn walk(tree: &::sled::Tree, stream: StreamKey, end: Head) -> Result<Head, ReadError> {
-    let mut walk = Walk::after(stream, Head::EMPTY);
-    let mut frames = Frames::new(tree, &walk, end);
-    while walk.last().seq < end.seq {
-        let frame = frames.next(walk.last().next().get())?;
-        walk.step(&frame)?;
+    let frames = Frames::new(tree, Walk::after(stream, Head::EMPTY), end);
+    for record in frames {
+        record?;
     }
-    match walk.last() == end {
-        true => Ok(end),
-        false => Err(other_end(end, walk.last().digest)),
-    }
+    Ok(end)
 }
 
-/// The framed records of one stream, one in memory at a time.
-struct Frames {
+/// The framed records of one stream, one in memory at a time; all that needs no key is checked. No
+/// lock is held between two of them, and records appended meanwhile are not shown.
+pub(super) struct Frames {
     values: ::sled::Iter,
     /// A value that was read and belongs to the next record.
     pending: Option<(::sled::IVec, ::sled::IVec)>,
+    walk: Walk,
     end: Head,
+    ended: bool,
 }
 
 impl Frames {
-    fn new(tree: &::sled::Tree, walk: &Walk, end: Head) -> Frames {
+    /// From the record after `walk`'s last one to `end`.
+    pub(super) fn new(tree: &::sled::Tree, walk: Walk, end: Head) -> Frames {
         let stream = walk.stream();
         let first = chunk_key(stream, walk.last().next().get(), 0);
         let values = tree.range(first..=chunk_key(stream, end.seq, u16::MAX));
-        Frames { values, pending: None, end }
+        Frames { values, pending: None, walk, end, ended: false }
     }
 
-    /// The frame of record `seq`, which is the next one.
-    fn next(&mut self, seq: u64) -> Result<Vec<u8>, ReadError> {
+    /// The next record's frame, unless the last one was given, checked by `check`.
+    fn checked<T>(
+        &mut self,
+        check: impl FnOnce(&mut Walk, Vec<u8>) -> Result<T, ReadError>,
+    ) -> Option<Result<T, ReadError>> {
+        if self.ended || self.walk.last().seq >= self.end.seq {
+            return None;
+        }
+        let read = self.joined().and_then(|frame| {
+            let checked = check(&mut self.walk, frame)?;
+            let last = self.walk.last();
+            match last.seq == self.end.seq && last.digest != self.end.digest {
+                true => Err(other_end(self.end, last.digest)),
+                false => Ok(checked),
+            }
+        });
+        self.ended = read.is_err();
+        Some(read)
+    }
+
+    fn joined(&mut self) -> Result<Vec<u8>, ReadError> {
+        let seq = self.walk.last().next().get();
         let mut joiner = Joiner::default();
         loop {
             let entry = match self.pending.take() {
@@ -147,37 +166,30 @@ impl Frames {
     }
 }
 
+impl Iterator for Frames {
+    type Item = Result<SealedRecord, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.checked(Walk::sealed)
+    }
+}
+
 fn other_end(end: Head, found: Digest) -> ReadError {
     let (expected, found) = (end.digest.to_hex(), found.to_hex());
     let reason = format!("the stream's head has the digest {expected}, this is {found}");
     ReadError::Seal { seq: end.seq, reason }
 }
 
-/// The records of one stream, one in memory at a time. No lock is held between two of them, and
-/// records appended meanwhile are not shown.
+/// The same, opened.
 pub(super) struct Records {
     frames: Frames,
     key: DataKey,
-    walk: Walk,
-    end: Head,
-    ended: bool,
 }
 
 impl Records {
     /// From the record after `walk`'s last one to `end`.
     pub(super) fn new(tree: &::sled::Tree, key: DataKey, walk: Walk, end: Head) -> Records {
-        let frames = Frames::new(tree, &walk, end);
-        Records { frames, key, walk, end, ended: false }
-    }
-
-    fn read_one(&mut self) -> Result<Record, ReadError> {
-        let seq = self.walk.last().next().get();
-        let frame = self.frames.next(seq)?;
-        let record = self.walk.open(&self.key, &frame)?;
-        if seq == self.end.seq && record.digest != self.end.digest {
-            return Err(other_end(self.end, record.digest));
-        }
-        Ok(record)
+        Records { frames: Frames::new(tree, walk, end), key }
     }
 }
 
@@ -185,12 +197,8 @@ impl Iterator for Records {
     type Item = Result<Record, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended || self.walk.last().seq >= self.end.seq {
-            return None;
-        }
-        let record = self.read_one();
-        self.ended = record.is_err();
-        Some(record)
+        let Records { frames, key } = self;
+        frames.checked(|walk, frame| walk.open(key, &frame))
     }
 }
 

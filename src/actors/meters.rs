@@ -1,0 +1,363 @@
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::time::Instant;
+
+use super::response::{Ask, Quota, QuotaExceeded, Response};
+use crate::fairness::{Bucket, Room, TOKEN};
+use crate::ids::TenantId;
+use crate::limits::GATEWAY_IN_FLIGHT_MAX;
+use crate::session::Command;
+use crate::store::EventLog;
+use crate::tenancy::{Admissions, Quotas};
+
+/// What each tenant takes of what all share, held against what it may. Requests are measured where
+/// they come in: who is over a limit hears so at once, from the gateway's thread, and costs the
+/// others nothing more.
+pub(super) struct Meters {
+    admissions: Admissions,
+    log: Arc<dyn EventLog>,
+    /// The moment that buckets count from.
+    start: Instant,
+    in_flight: Mutex<Room>,
+    tenants: RwLock<BTreeMap<TenantId, Arc<Meter>>>,
+}
+
+/// One tenant's.
+#[derive(Default)]
+pub(super) struct Meter {
+    bucket: Mutex<Bucket>,
+    awake: AtomicUsize,
+    refused: Counts,
+}
+
+#[derive(Default)]
+struct Counts {
+    awake_users: AtomicU64,
+    in_flight: AtomicU64,
+    utterances: AtomicU64,
+    sealed_bytes: AtomicU64,
+    trainings: AtomicU64,
+    busy: AtomicU64,
+}
+
+/// How often a tenant was turned away since the start, by what it had too much of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Refusals {
+    pub awake_users: u64,
+    pub in_flight: u64,
+    pub utterances: u64,
+    pub sealed_bytes: u64,
+    /// Trainings that had to ask for a place again.
+    pub trainings: u64,
+    /// Turned away not by a quota, but because all tenants together left no room.
+    pub busy: u64,
+}
+
+/// What a tenant takes now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Usage {
+    pub awake_users: usize,
+    pub in_flight: usize,
+    pub refused: Refusals,
+}
+
+/// A request that was let in. Ends when dropped.
+pub(super) struct InFlight {
+    meters: Arc<Meters>,
+    tenant: TenantId,
+}
+
+/// Milliseconds after which a request may be sent again that met too many others.
+const RETRY_CROWD_MS: u32 = 200;
+/// Millionths of a token that a query takes: it records nothing.
+const QUERY_COST: u64 = TOKEN / 10;
+
+impl Meters {
+    pub fn new(admissions: Admissions, log: Arc<dyn EventLog>) -> Meters {
+        let in_flight = Mutex::new(Room::new(GATEWAY_IN_FLIGHT_MAX));
+        Meters { admissions, log, start: Instant::now(), in_flight, tenants: RwLock::default() }
+    }
+
+    /// Lets a request in, or says why not.
+    ///
+    /// - errors: the answer; [`Response::QuotaExceeded`] for what is the tenant's own limit,
+    ///   [`Response::Busy`] for what is everybody's.
+    pub fn admit(
+        self: &Arc<Self>,
+        tenant: &TenantId,
+        ask: &Ask,
+    ) -> Result<InFlight, Box<Response>> {
+        let (quotas, meter) = (self.quotas(tenant), self.meter(tenant));
+        self.check_bytes(tenant, ask, &quotas, &meter)?;
+        {
+            let mut room = self.room();
+            let held = room.held_by(tenant) as u64;
+            if let Some(limit) = quotas.in_flight.filter(|limit| held >= u64::from(*limit)) {
+                let over = over(Quota::InFlight, held, limit.into(), Some(RETRY_CROWD_MS));
+                return Err(count(&meter.refused.in_flight, tenant, over));
+            }
+            if !room.take(tenant, 1) {
+                meter.refused.busy.fetch_add(1, Ordering::Relaxed);
+                let full = "the service has too many requests in hand";
+                return Err(Box::new(Response::busy(full, RETRY_CROWD_MS)));
+            }
+        }
+        let in_flight = InFlight { meters: self.clone(), tenant: tenant.clone() };
+        self.check_rate(tenant, ask, &quotas, &meter)?;
+        Ok(in_flight)
+    }
+
+    /// Whoever has used up the room in the log may still ask, and withdraw.
+    fn check_bytes(
+        &self,
+        tenant: &TenantId,
+        ask: &Ask,
+        quotas: &Quotas,
+        meter: &Meter,
+    ) -> Result<(), Box<Response>> {
+        let appends =
+            matches!(ask, Ask::Command(command) if !matches!(command, Command::Close { .. }));
+        let Some(limit) = quotas.sealed_bytes.filter(|_| appends) else { return Ok(()) };
+        // Counted before the quota was made known; an error here is one of reading the log, which
+        // whoever reads or writes it next will say better.
+        let used = self.log.sealed_bytes(tenant).unwrap_or(0);
+        match used >= limit {
+            false => Ok(()),
+            true => {
+                let over = over(Quota::SealedBytes, used, limit, None);
+                Err(count(&meter.refused.sealed_bytes, tenant, over))
+            }
+        }
+    }
+
+    fn check_rate(
+        &self,
+        tenant: &TenantId,
+        ask: &Ask,
+        quotas: &Quotas,
+        meter: &Meter,
+    ) -> Result<(), Box<Response>> {
+        let Some(rate) = quotas.utterances_per_second else { return Ok(()) };
+        let cost = match ask {
+            Ask::Command(_) => TOKEN,
+            Ask::Query(_) | Ask::Wait { .. } => QUERY_COST,
+            // Wakes nobody and reads nothing.
+            Ask::Hello => return Ok(()),
+            // An operator must get through when the lab's people do not.
+            Ask::Order(_) => return Ok(()),
+        };
+        let burst = quotas.burst.unwrap_or(rate);
+        let now_us = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
+        let mut bucket = meter.bucket.lock().unwrap_or_else(PoisonError::into_inner);
+        let Err(wait_us) = bucket.take(now_us, rate, burst, cost) else { return Ok(()) };
+        drop(bucket);
+        let wait_ms = u32::try_from(wait_us.div_ceil(1_000)).ok();
+        // It used up what there was: as many as may go through at once, and a second's worth.
+        let over = over(Quota::Utterances, u64::from(burst), rate.into(), wait_ms);
+        Err(count(&meter.refused.utterances, tenant, over))
+    }
+
+    /// Says no to one person more who would be awake.
+    pub fn refuse_waking(&self, tenant: &TenantId, awake: usize, limit: u32) -> Box<Response> {
+        let over = over(Quota::AwakeUsers, awake as u64, limit.into(), Some(RETRY_CROWD_MS));
+        count(&self.meter(tenant).refused.awake_users, tenant, over)
+    }
+
+    /// Notes that a request met a crowd that is not its tenant's alone.
+    pub fn note_busy(&self, tenant: &TenantId) {
+        self.meter(tenant).refused.busy.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Notes that a training found its tenant's queue full.
+    pub fn note_training_refused(&self, tenant: &TenantId) {
+        self.meter(tenant).refused.trainings.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub fn note_awake(&self, tenant: &TenantId, awake: usize) {
+        self.meter(tenant).awake.store(awake, Ordering::Relaxed);
+    }
+
+    pub fn quotas(&self, tenant: &TenantId) -> Quotas {
+        self.admissions.quotas(tenant)
+    }
+
+    /// What every tenant takes that has asked for anything since the start.
+    pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
+        let tenants = self.tenants.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let room = self.room();
+        let usage = |(tenant, meter): (TenantId, Arc<Meter>)| {
+            let in_flight = room.held_by(&tenant);
+            let awake_users = meter.awake.load(Ordering::Relaxed);
+            (tenant, Usage { awake_users, in_flight, refused: meter.refused.now() })
+        };
+        tenants.into_iter().map(usage).collect()
+    }
+
+    fn meter(&self, tenant: &TenantId) -> Arc<Meter> {
+        let known =
+            self.tenants.read().unwrap_or_else(PoisonError::into_inner).get(tenant).cloned();
+        known.unwrap_or_else(|| {
+            let mut tenants = self.tenants.write().unwrap_or_else(PoisonError::into_inner);
+            tenants.entry(tenant.clone()).or_default().clone()
+        })
+    }
+
+    // Its methods leave it whole whenever they return.
+    fn room(&self) -> MutexGuard<'_, Room> {
+        self.in_flight.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for InFlight {
+    fn drop(&mut self) {
+        self.meters.room().give_back(&self.tenant, 1);
+    }
+}
+
+impl Counts {
+    fn now(&self) -> Refusals {
+        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        Refusals {
+            awake_users: read(&self.awake_users),
+            in_flight: read(&self.in_flight),
+            utterances: read(&self.utterances),
+            sealed_bytes: read(&self.sealed_bytes),
+            trainings: read(&self.trainings),
+            busy: read(&self.busy),
+        }
+    }
+}
+
+/// Counts a refusal, and says the first of its kind to the operator.
+fn count(counter: &AtomicU64, tenant: &TenantId, over: QuotaExceeded) -> Box<Response> {
+    if counter.fetch_add(1, Ordering::Relaxed) == 0 {
+        let (quota, limit) = (over.quota, over.limit);
+        tracing::warn!(%tenant, ?quota, limit, "a tenant is over its quota for the first time");
+    }
+    Box::new(Response::QuotaExceeded(over))
+}
+
+fn over(quota: Quota, used: u64, limit: u64, retry_after_ms: Option<u32>) -> QuotaExceeded {
+    let message = match quota {
+        Quota::AwakeUsers => {
+            format!("all of the {limit} people of this tenant who may be awake at once are busy")
+        }
+        Quota::InFlight => format!("{used} requests of this tenant are unanswered; {limit} may be"),
+        Quota::Utterances => format!("this tenant may say {limit} utterances a second"),
+        Quota::SealedBytes => format!(
+            "this tenant has {used} bytes in the log, of {limit} that it may have; \
+             the operator can allow more"
+        ),
+    };
+    QuotaExceeded { quota, used, limit, retry_after_ms, message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::StreamId;
+    use crate::session::Query;
+    use crate::store::conformance::{batch, stream};
+    use crate::store::{Store, open_memory};
+    use crate::tenancy::{Registry, Standing};
+
+    fn meters(store: &Store, quotas: Quotas) -> (Arc<Meters>, TenantId) {
+        let (admissions, lab) = (Admissions::default(), TenantId::new("lab").unwrap());
+        admissions.update(&lab, &standing(quotas));
+        (Arc::new(Meters::new(admissions, store.log.clone())), lab)
+    }
+
+    /// As an operator's order leaves it.
+    fn standing(quotas: Quotas) -> Standing {
+        use crate::events::{QuotasSet, Record, TenantOpened};
+        use crate::ids::{Digest, RequestId, Timestamp};
+        let mut registry = Registry::default();
+        for event in [TenantOpened {}.into(), QuotasSet { quotas }.into()] {
+            let (seq, prev) = (registry.head().next(), registry.head().digest);
+            let (at, request) = (Timestamp(1), RequestId([0; 16]));
+            let digest = Digest::of(&seq.get().to_be_bytes());
+            registry.apply(&Record { seq, at, request, prev, digest, event }).unwrap();
+        }
+        registry.standing().clone()
+    }
+
+    fn say() -> Ask {
+        Ask::Command(Command::Say { utterance: "ring the bell".to_owned() })
+    }
+
+    fn refused(answer: Result<InFlight, Box<Response>>) -> QuotaExceeded {
+        match answer.map_err(|response| *response) {
+            Err(Response::QuotaExceeded(over)) => over,
+            Err(other) => panic!("{other:?}"),
+            Ok(_) => panic!("let in"),
+        }
+    }
+
+    #[test]
+    fn requests_in_flight_are_counted_until_they_end() {
+        let quotas = Quotas { in_flight: Some(2), ..Quotas::default() };
+        let (meters, lab) = meters(&open_memory(), quotas);
+        let first = meters.admit(&lab, &say()).unwrap();
+        let second = meters.admit(&lab, &Ask::Hello).unwrap();
+        let over = refused(meters.admit(&lab, &say()));
+        assert_eq!((over.quota, over.used, over.limit), (Quota::InFlight, 2, 2));
+        assert_eq!(over.retry_after_ms, Some(RETRY_CROWD_MS));
+        assert!(meters.admit(&TenantId::local(), &say()).is_ok(), "nobody else's business");
+        drop(first);
+        let third = meters.admit(&lab, &say()).unwrap();
+        assert_eq!(meters.usage()[&lab].in_flight, 2);
+        drop((second, third));
+        let usage = meters.usage()[&lab];
+        assert_eq!((usage.in_flight, usage.refused.in_flight), (0, 1));
+    }
+
+    #[test]
+    fn utterances_and_queries_draw_on_one_bucket() {
+        let quotas = Quotas { utterances_per_second: Some(1), burst: Some(3), ..Quotas::default() };
+        let (meters, lab) = meters(&open_memory(), quotas);
+        let say_all = |count| (0..count).filter(|_| meters.admit(&lab, &say()).is_ok()).count();
+        assert_eq!(say_all(2), 2);
+        let status = Ask::Query(Query::Status);
+        let asked = (0..30).filter(|_| meters.admit(&lab, &status).is_ok()).count();
+        // One token is left, and with it ten queries; a slow test earns some more.
+        assert!((10..30).contains(&asked), "{asked}");
+        let over = refused(meters.admit(&lab, &say()));
+        assert_eq!((over.quota, over.limit), (Quota::Utterances, 1));
+        assert!(over.retry_after_ms.is_some_and(|ms| (1..=1_000).contains(&ms)), "{over:?}");
+        assert!(meters.admit(&lab, &Ask::Hello).is_ok());
+        assert_eq!(meters.usage()[&lab].in_flight, 0, "who is refused holds no place");
+    }
+
+    #[test]
+    fn a_full_log_lets_people_look_and_withdraw() {
+        let (store, quotas) =
+            (open_memory(), Quotas { sealed_bytes: Some(1_000), ..Quotas::default() });
+        let (meters, lab) = meters(&store, quotas);
+        let ada: StreamId = stream(&store.keys, "lab", "ada");
+        assert!(meters.admit(&lab, &say()).is_ok());
+        let long = "x".repeat(2_000);
+        let head = store.log.head(&ada).unwrap();
+        store.log.append(&ada, head, batch([&*long])).wait().unwrap();
+        let over = refused(meters.admit(&lab, &say()));
+        assert_eq!(
+            (over.quota, over.limit, over.retry_after_ms),
+            (Quota::SealedBytes, 1_000, None)
+        );
+        assert!(over.used > 2_000 && over.message.contains("operator"), "{over:?}");
+        assert!(meters.admit(&lab, &Ask::Query(Query::Known)).is_ok());
+        let close = Command::Close { reason: "enough".to_owned() };
+        assert!(meters.admit(&lab, &Ask::Command(close)).is_ok());
+    }
+
+    #[test]
+    fn without_quotas_one_tenant_gets_what_the_service_has_and_another_still_comes_in() {
+        let (meters, lab) = meters(&open_memory(), Quotas::default());
+        let held: Vec<_> = std::iter::from_fn(|| meters.admit(&lab, &Ask::Hello).ok()).collect();
+        assert_eq!(held.len(), GATEWAY_IN_FLIGHT_MAX);
+        let busy = meters.admit(&lab, &Ask::Hello).map_err(|response| *response);
+        assert!(matches!(busy, Err(Response::Busy(_))));
+        assert!(meters.admit(&TenantId::local(), &say()).is_ok());
+        assert_eq!(meters.usage()[&lab].refused.busy, 2);
+    }
+}

@@ -1,0 +1,138 @@
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::failure::Failure;
+use super::{data_dir, verify};
+use crate::actors::{Book, OrderError};
+use crate::evidence::{Checkpoint, NoteSigner, VerifierKey};
+use crate::ids::TenantId;
+use crate::replay::{self, ORIGIN, Through, Wanted};
+use crate::store::{self, OpenError, Store};
+
+/// Sign what a lab's log holds now, so that nobody can rewrite it unnoticed.
+///
+/// Closes what no segment covers yet, signs the tree over all segments, and keeps the checkpoint in
+/// the directory. A checkpoint binds the operator only when somebody else keeps it too: hand it out.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice checkpoint --data lab --origin lab.example.org    the first time: names the service
+  apprentice checkpoint --data lab --out may.checkpoint
+  apprentice checkpoint --data lab --public-key > lab.pub      what verifiers need
+  apprentice checkpoint --data lab --since may.checkpoint --out may-to-june.proof
+
+A service that runs signs by itself, at most once a minute and when it ends; checkpoints/TENANT in the
+data directory holds all that were ever signed. docs/evidence.md says what a checkpoint shows.
+
+Exit codes: 1 the log does not continue what was signed before; 2 the directory or a file cannot be
+used.")]
+pub struct Arguments {
+    /// The data directory, which nothing else may have open
+    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The lab.
+    #[arg(long, value_name = "NAME", default_value = "local")]
+    tenant: String,
+    /// Write to this file instead of to standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// The name of the service in checkpoints and keys, such as its host. Given once, before the
+    /// first checkpoint; `apprentice` when it never was.
+    #[arg(long, value_name = "NAME")]
+    origin: Option<String>,
+    /// Sign nothing, and print the public key instead.
+    #[arg(long, conflicts_with_all = ["since"])]
+    public_key: bool,
+    /// Write a proof that the log only grew since this checkpoint, for `apprentice verify --since`.
+    #[arg(long, value_name = "OLD_CHECKPOINT")]
+    since: Option<PathBuf>,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let tenant = TenantId::new(&arguments.tenant).map_err(Failure::bad_input)?;
+    let directory = data_dir::choose(arguments.data)?;
+    check_there(&directory)?;
+    let store = store::open(&directory).map_err(|error| match error {
+        OpenError::Damaged { .. } | OpenError::Database { .. } => Failure::failed(error),
+        _ => Failure::bad_input(error),
+    })?;
+    if !store.log.tenants().map_err(Failure::failed)?.contains(&tenant) {
+        let directory = directory.display();
+        return Err(Failure::bad_input(format!("{directory} holds no records of tenant {tenant}")));
+    }
+    if let Some(origin) = &arguments.origin {
+        name(&store, &tenant, origin)?;
+    }
+    let signer = replay::signer_of(&store, &tenant).map_err(Failure::bad_input)?;
+    let text = if arguments.public_key {
+        format!("{}\n", signer.public())
+    } else {
+        let since = arguments.since.as_deref().map(|path| older(path, &signer.public()));
+        let since = since.transpose()?;
+        let failed = |error: OrderError| Failure::failed(error);
+        let mut book = Book::open(store.clone()).map_err(failed)?;
+        let note = book.sign(&tenant, Through::Head).map_err(failed)?;
+        match since {
+            None => note,
+            Some(since) => {
+                let wanted = Wanted { record: None, reveal: false, since: Some(since.size) };
+                let registry = book.registry(&tenant);
+                let proof = replay::prove(&store, &tenant, &registry, &wanted);
+                proof.map_err(Failure::failed)?.to_text()
+            }
+        }
+    };
+    write(arguments.out.as_deref(), &text)
+}
+
+/// Names the service, unless something was signed under another name already.
+fn name(store: &Store, tenant: &TenantId, origin: &str) -> Result<(), Failure> {
+    if origin.is_empty() || origin.ends_with('/') {
+        return Err(Failure::bad_input("--origin is the name of a host or of a service"));
+    }
+    // What else a name may be is for the key to say.
+    NoteSigner::new(&format!("{origin}/{tenant}"), &[1; 32])
+        .map_err(|error| Failure::bad_input(format!("--origin: {error}")))?;
+    let mut signed = false;
+    for tenant in store.log.tenants().map_err(Failure::failed)? {
+        signed |= store.checkpoints.newest(&tenant).map_err(Failure::failed)?.is_some();
+    }
+    store.checkpoints.name(origin, signed.then_some(ORIGIN)).map_err(Failure::bad_input)
+}
+
+/// An older checkpoint of the same log.
+pub(super) fn older(path: &Path, key: &VerifierKey) -> Result<Checkpoint, Failure> {
+    let note = verify::read(path)?;
+    Checkpoint::open(&String::from_utf8_lossy(&note), key)
+        .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))
+}
+
+/// Opening makes a directory that is not there, which nobody means who asks for what it holds.
+fn check_there(directory: &Path) -> Result<(), Failure> {
+    match directory.join("LAYOUT").exists() || directory.join("log").exists() {
+        true => Ok(()),
+        false => Err(Failure::bad_input(format!(
+            "there is no data directory of apprentice at {}",
+            directory.display()
+        ))),
+    }
+}
+
+/// To a new file, or to standard output.
+pub(super) fn write(out: Option<&Path>, text: &str) -> Result<(), Failure> {
+    match out {
+        Some(path) => fs::write(path, text).map_err(|error| {
+            Failure::bad_input(format!("{} cannot be written: {error}", path.display()))
+        }),
+        None => {
+            let mut stdout = std::io::stdout().lock();
+            stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {
+                Failure::failed(format!("standard output cannot be written: {error}"))
+            })
+        }
+    }
+}
