@@ -29,7 +29,8 @@ pub struct Arguments {
     /// loopback or a socket file.
     #[arg(long, value_name = "ENDPOINT", required = true)]
     zmq: Vec<String>,
-    /// The recipe that new people start with: default, paper, or a file.
+    /// The recipe that new people start with: default, paper, grammar, seq2seq,
+    /// seq2seq-grammar, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
     /// Let appends fail on purpose, by this plan: a drill, never for real participants.
