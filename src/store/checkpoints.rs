@@ -251,7 +251,7 @@ mod tests {
         assert!(many.len() as u64 > 2 * END_BYTES);
         // Wherever the part that is read begins, inside of a note or between two.
         for cut in (0..200).step_by(7) {
-            let last = &many[..many.len() - cut];
+            let last = &many.as_bytes()[..many.len() - cut];
             fs::write(&path, last).unwrap();
             let newest = feed.newest(&local).unwrap();
             assert_eq!(newest.as_ref(), feed.all(&local).unwrap().last(), "{cut} bytes cut");

@@ -33,6 +33,8 @@ const HEAD_BYTES: usize = 4 + 1 + 4 + 4;
 /// More than any record or key file has.
 const PAYLOAD_BYTES_MAX: usize = RECORD_BYTES_MAX + 64 * 1024;
 
+const SHORT: &str = "the file ends before it does";
+
 const TENANT: u8 = 1;
 const PERSON: u8 = 2;
 const RECORD: u8 = 3;
@@ -189,16 +191,21 @@ pub(super) enum Frame {
 pub(super) type BadFrame = (u64, String);
 
 /// Reads an export frame by frame, proving each.
-pub(super) struct Reader {
-    input: BufReader<File>,
+pub(super) struct Reader<R> {
+    input: R,
     hasher: blake3::Hasher,
     pub(super) frames: u64,
 }
 
-impl Reader {
-    pub(super) fn open(path: &Path) -> io::Result<Reader> {
-        let input = BufReader::new(File::open(path)?);
-        Ok(Reader { input, hasher: blake3::Hasher::new(), frames: 0 })
+impl Reader<BufReader<File>> {
+    pub(super) fn open(path: &Path) -> io::Result<Reader<BufReader<File>>> {
+        Ok(Reader::of(BufReader::new(File::open(path)?)))
+    }
+}
+
+impl<R: Read> Reader<R> {
+    pub(super) fn of(input: R) -> Reader<R> {
+        Reader { input, hasher: blake3::Hasher::new(), frames: 0 }
     }
 
     /// The next frame. After [`Frame::End`] the file must end.
@@ -217,8 +224,12 @@ impl Reader {
         if &head[..4] != MAGIC || bytes > PAYLOAD_BYTES_MAX {
             return Err("it does not begin as a frame does".to_owned());
         }
-        let mut payload = vec![0; bytes];
-        self.fill(&mut payload)?;
+        // What the length says is believed as far as there are bytes, and no memory is taken before.
+        let mut payload = Vec::new();
+        let read = self.input.by_ref().take(bytes as u64).read_to_end(&mut payload);
+        if read.map_err(|error| error.to_string())? < bytes {
+            return Err(SHORT.to_owned());
+        }
         let found = checksum(kind, length, &[&payload]);
         if found != said {
             return Err(format!("its checksum is {found:08x}, it says {said:08x}"));
@@ -233,7 +244,7 @@ impl Reader {
 
     fn fill(&mut self, bytes: &mut [u8]) -> Result<(), String> {
         self.input.read_exact(bytes).map_err(|error| match error.kind() {
-            io::ErrorKind::UnexpectedEof => "the file ends before it does".to_owned(),
+            io::ErrorKind::UnexpectedEof => SHORT.to_owned(),
             _ => error.to_string(),
         })
     }

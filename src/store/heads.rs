@@ -151,7 +151,7 @@ fn checksum(kind: u8, length: u32, payload: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-fn parse(bytes: &[u8]) -> HeadsRead {
+pub(super) fn parse(bytes: &[u8]) -> HeadsRead {
     let mut read = HeadsRead { heads: Heads::new(), damage: None };
     let mut at = 0;
     let mut expected = BASE;

@@ -41,15 +41,11 @@ pub(super) fn standing(dir: &Path) -> Result<Standing, OpenError> {
     let path = dir.join(LAYOUT_FILE);
     let shown = || dir.display().to_string();
     match fs::read(&path) {
-        Ok(bytes) => {
-            let text = std::str::from_utf8(&bytes).ok().and_then(|text| text.strip_suffix('\n'));
-            let number = text.and_then(|text| text.strip_prefix(LAYOUT_TEXT)?.parse().ok());
-            match number {
-                Some(known @ 1..=LAYOUT) => Ok(Standing::At(known)),
-                Some(found) if found > LAYOUT => Err(OpenError::Newer { dir: shown(), found }),
-                _ => Err(OpenError::Layout { dir: shown() }),
-            }
-        }
+        Ok(bytes) => match number(&bytes) {
+            Some(known @ 1..=LAYOUT) => Ok(Standing::At(known)),
+            Some(found) if found > LAYOUT => Err(OpenError::Newer { dir: shown(), found }),
+            _ => Err(OpenError::Layout { dir: shown() }),
+        },
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let entries = fs::read_dir(dir).map_err(|error| failed(dir, dir, &error))?;
             for entry in entries {
@@ -64,6 +60,12 @@ pub(super) fn standing(dir: &Path) -> Result<Standing, OpenError> {
         }
         Err(error) => Err(failed(dir, &path, &error)),
     }
+}
+
+/// The number that the file's one line names.
+pub(super) fn number(bytes: &[u8]) -> Option<u32> {
+    let text = std::str::from_utf8(bytes).ok()?.strip_suffix('\n')?;
+    text.strip_prefix(LAYOUT_TEXT)?.parse().ok()
 }
 
 /// Names the layout of `dir`, durably and in one step.

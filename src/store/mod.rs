@@ -7,6 +7,7 @@ mod checks;
 mod closed;
 pub mod conformance;
 mod copy;
+pub mod decoders;
 mod drill;
 mod entropy;
 mod export;

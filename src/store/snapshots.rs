@@ -115,7 +115,7 @@ impl SnapshotStore {
     }
 }
 
-fn read<T: DeserializeOwned>(plain: &[u8]) -> Option<(Head, T)> {
+pub(super) fn read<T: DeserializeOwned>(plain: &[u8]) -> Option<(Head, T)> {
     let (seq, rest) = plain.split_first_chunk()?;
     let (digest, body) = rest.split_first_chunk()?;
     let head = Head { seq: u64::from_be_bytes(*seq), digest: Digest(*digest) };

@@ -24,6 +24,18 @@ pub fn powerloss(images: u64, seed: Option<u64>) -> Result<(), String> {
     faults("after_a_power_cut", "APPRENTICE_IMAGES", images, seed)
 }
 
+/// Throws so many cases at the decoders; the first that makes one panic, or take too much memory, is
+/// printed.
+pub fn fuzz(cases: u64, seed: Option<u64>, target: Option<&str>) -> Result<(), String> {
+    let (cases, seed) = (cases.to_string(), seed.map(|seed| seed.to_string()));
+    let mut environment = vec![("APPRENTICE_CASES", &*cases)];
+    environment.extend(seed.as_deref().map(|seed| ("APPRENTICE_SEED", seed)));
+    environment.extend(target.map(|target| ("APPRENTICE_TARGET", target)));
+    let arguments =
+        ["test", "--release", "--test", "hostile", "--", "--nocapture", "no_bytes_make_a_decoder"];
+    run_with(&environment, "cargo", &arguments)
+}
+
 /// Flips so many bits of a closed directory, one at a time; the first that was neither harmless nor
 /// reported is printed.
 pub fn damage(flips: u64, seed: Option<u64>) -> Result<(), String> {

@@ -56,6 +56,19 @@ enum Task {
         #[arg(long)]
         seed: Option<u64>,
     },
+    /// Hostile bytes: as many cases as wanted for every decoder, in the release build.
+    ///
+    /// Example: cargo xtask fuzz --cases 100000000 --seed 7
+    Fuzz {
+        #[arg(long)]
+        cases: u64,
+        /// As an earlier run printed it; drawn when left out.
+        #[arg(long)]
+        seed: Option<u64>,
+        /// Only decoders whose name has this in it.
+        #[arg(long)]
+        target: Option<String>,
+    },
     /// A closed directory damaged: as many flipped bits as wanted, in the release build.
     ///
     /// Example: cargo xtask damage --flips 20000
@@ -79,6 +92,7 @@ fn main() -> ExitCode {
         Task::Simulate { seeds, seed } => drills::simulate(seeds.unwrap_or(1), seed),
         Task::Crash { kills, seed } => drills::crash(kills, seed),
         Task::Powerloss { images, seed } => drills::powerloss(images, seed),
+        Task::Fuzz { cases, seed, target } => drills::fuzz(cases, seed, target.as_deref()),
         Task::Damage { flips, seed } => drills::damage(flips, seed),
         Task::Bench { filter } => stage::bench(filter.as_deref()),
     };

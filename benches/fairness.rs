@@ -1,4 +1,4 @@
-//! What one lab's flood costs another lab. `cargo bench --bench neighbours`
+//! What one lab's flood costs another lab. `cargo bench --bench fairness`
 //!
 //! Two labs in one service, on the disk that `target/` is on. The quiet lab says 20 utterances a
 //! second; the flood sends a hundred times as many, without waiting for answers. Short stretches
@@ -207,7 +207,7 @@ fn measure(service: &Service, name: &str, quotas: Quotas) {
 }
 
 fn main() {
-    let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("neighbours");
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fairness");
     let _ = std::fs::remove_dir_all(&directory);
     let service = start(&directory);
     let quotas = Quotas {
