@@ -142,10 +142,8 @@ impl Meters {
         let cost = match ask {
             Ask::Command(_) => TOKEN,
             Ask::Query(_) | Ask::Wait { .. } => QUERY_COST,
-            // Wakes nobody and reads nothing.
-            Ask::Hello => return Ok(()),
-            // An operator must get through when the lab's people do not.
-            Ask::Order(_) => return Ok(()),
+            // Wakes nobody; and an operator must get through when the lab's people do not.
+            Ask::Hello | Ask::Order(_) => return Ok(()),
         };
         let burst = quotas.burst.unwrap_or(rate);
         let now_us = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
