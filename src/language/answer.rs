@@ -89,3 +89,31 @@ pub struct Discarded {
     /// A sentence that names the object and the reason.
     pub reason: String,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_model_guesses_and_only_at_words_it_was_not_taught() {
+        let clauses = ["go to <obj>", "wash <obj>"].map(LiftedUtterance::parse);
+        let answer = |answered_by: &[Answerer], nearest: Vec<Near>| {
+            let answered_by = answered_by.to_vec();
+            let lifted = clauses.to_vec();
+            let evidence = Evidence { lifted, nearest, answered_by, ..Evidence::default() };
+            Answer { outcome: Outcome::NotSure, evidence, mentioned: None }
+        };
+        let (grammar, model) = (Answerer::Grammar, Answerer::Seq2seq);
+        let taught = Near {
+            exemplar: clauses[1].clone(),
+            program: "WASH <obj:1>".parse().unwrap(),
+            distance: 0.1,
+            number: 3,
+        };
+        assert!(answer(&[grammar, model], Vec::new()).guessed());
+        assert!(!answer(&[grammar, model], vec![taught.clone()]).guessed());
+        assert!(answer(&[model, model], vec![taught]).guessed());
+        assert!(!answer(&[grammar, grammar], Vec::new()).guessed());
+        assert!(!answer(&[], Vec::new()).guessed());
+    }
+}

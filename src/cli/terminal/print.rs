@@ -434,6 +434,17 @@ mod tests {
     }
 
     #[test]
+    fn why_names_the_part_that_answered_instead_of_what_is_nearest() {
+        let mut told = answered(Outcome::NotSure);
+        told.evidence.nearest.clear();
+        told.evidence.answered_by = vec![Answerer::Grammar, Answerer::Grammar, Answerer::Seq2seq];
+        let text = why("go to the mug and wash it", &told).join("\n");
+        assert_eq!(text.matches("The grammar answered.").count(), 1, "{text}");
+        assert!(text.contains("The sequence-to-sequence model answered."), "{text}");
+        assert!(!text.contains("nothing to compare"), "{text}");
+    }
+
+    #[test]
     fn what_stands_where_is_grouped_by_place() {
         let thing = |name: &str, place: Option<&str>, states: &[&str]| Thing {
             name: name.into(),
