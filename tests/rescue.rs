@@ -367,8 +367,9 @@ fn a_check_that_may_not_take_memory_says_nothing_that_could_be_believed() {
     live(&open(&dir).unwrap(), &SeededEntropy::new(7), 50);
     copy_tree(&dir, &copy);
     let check = |memory: &str| {
-        let arguments = ["check-copy", "--part", "log", "--memory", memory, text(&copy)];
-        program(arguments).output().unwrap()
+        let parent = std::process::id().to_string();
+        let arguments = ["check-copy", "--part", "log", "--memory", memory, "--parent", &parent];
+        program(arguments).arg(&copy).output().unwrap()
     };
     let starved = check("30000000");
     assert!(!String::from_utf8_lossy(&starved.stdout).ends_with("end\n"), "{starved:?}");

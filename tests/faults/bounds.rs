@@ -153,15 +153,16 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
 #[test]
 fn a_failed_service_does_not_wait_for_a_training() {
     let gate = Arc::<Gate>::default();
-    // Two people need seven appends each until they are learning, and their tenant one for each
-    // segment that the end of an episode closes; the next is the end.
-    let mut script = vec![Fault::None; 16];
+    // Two people need seven appends each until they are learning, and their tenant some for the
+    // segments that their episodes close; who begins then brings on the end.
+    let mut script = vec![Fault::None; 24];
     script.push(Fault::CrashAfter);
     let service = service(&gate, Some(FaultPlan { script, ..FaultPlan::default() }));
     let crowd = Crowd::new(&service);
     crowd.all_teach(2);
     let stage = Stage::Task { task: "Brass Glass".into(), seed: 1 };
-    crowd.send(2, fresh_id(), &Ask::Command(Command::StartEpisode { stage }));
+    let begin = Ask::Command(Command::StartEpisode { stage });
+    (2..14).for_each(|person| crowd.send(person, fresh_id(), &begin));
     let reason = service.wait().expect("its log is gone");
     let start = Instant::now();
     assert_eq!(service.stop(), Err(reason));
