@@ -1,6 +1,8 @@
 //! Long pieces of work by the real program, killed at any moment: bringing up a former layout, and
 //! salvaging. The next run makes good whatever was left half done.
 
+#[path = "support/chance.rs"]
+mod chance;
 #[path = "support/released.rs"]
 mod released;
 
@@ -13,7 +15,8 @@ use std::time::{Duration, Instant};
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Seq, StreamId};
 use apprentice::store::conformance::{batch, stream};
-use apprentice::store::{self, Entropy, OpenError, OsEntropy, SeededEntropy, Store};
+use apprentice::store::{self, Entropy, OpenError, SeededEntropy, Store};
+use chance::seed;
 use released::released;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
@@ -21,12 +24,7 @@ const KILLS: u32 = 25;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn dice() -> SeededEntropy {
-    let mut bytes = [0; 8];
-    OsEntropy.fill(&mut bytes);
-    let drawn = u64::from_be_bytes(bytes);
-    let seed = std::env::var("APPRENTICE_SEED").map_or(drawn, |seed| seed.parse().unwrap());
-    println!("seed: APPRENTICE_SEED={seed}");
-    SeededEntropy::new(seed)
+    SeededEntropy::new(seed())
 }
 
 /// A part of `whole`, drawn.

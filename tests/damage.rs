@@ -2,6 +2,9 @@
 //! recorded, or somebody is told. `APPRENTICE_FLIPS` and `APPRENTICE_SEED` give another
 //! number and repeat a run.
 
+#[path = "support/chance.rs"]
+mod chance;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,10 +17,11 @@ use std::time::{Duration, Instant};
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId, UserId};
 use apprentice::store::conformance::{batch, stream};
-use apprentice::store::{Entropy, Found, OpenError, Origin, OsEntropy, SeededEntropy, open};
+use apprentice::store::{Found, OpenError, Origin, SeededEntropy, open};
+use chance::{below, number, seed};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
-const FLIPS: usize = 2_000;
+const FLIPS: u64 = 2_000;
 const TRUNCATIONS: usize = 200;
 const PEOPLE: usize = 5;
 /// One flip of so many is also shown to the program itself, and to its salvage.
@@ -55,23 +59,6 @@ enum Kind {
 enum Outcome {
     Harmless,
     Reported,
-}
-
-fn below(dice: &SeededEntropy, bound: usize) -> usize {
-    let mut bytes = [0; 8];
-    dice.fill(&mut bytes);
-    usize::try_from(u64::from_be_bytes(bytes) % bound.max(1) as u64).unwrap()
-}
-
-fn seed() -> u64 {
-    let given = std::env::var("APPRENTICE_SEED").ok().map(|seed| seed.parse().unwrap());
-    let seed = given.unwrap_or_else(|| {
-        let mut bytes = [0; 8];
-        OsEntropy.fill(&mut bytes);
-        u64::from_be_bytes(bytes)
-    });
-    println!("seed: APPRENTICE_SEED={seed}");
-    seed
 }
 
 /// In memory where there is such a place: thousands of copies, each synced many times.
@@ -322,7 +309,7 @@ fn judge_all(original: Original, wounds: Vec<Wound>) -> BTreeMap<Outcome, usize>
 
 #[test]
 fn a_flipped_bit_is_harmless_or_reported_and_never_served_as_truth() {
-    let flips = std::env::var("APPRENTICE_FLIPS").map_or(FLIPS, |flips| flips.parse().unwrap());
+    let flips = number("APPRENTICE_FLIPS", FLIPS) as usize;
     let dice = SeededEntropy::new(seed());
     let original = original();
     let wounds = (0..flips).map(|_| original.wound(&dice, false)).collect();

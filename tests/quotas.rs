@@ -13,7 +13,7 @@ use apprentice::actors::{
     Response, Submit,
 };
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
-use apprentice::ids::{RequestId, TenantId, UserId};
+use apprentice::ids::{RequestId, Seq, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::service::{Data, Service};
 use apprentice::session::{Command, OnClash, Phase, Query};
@@ -117,6 +117,19 @@ fn stage() -> Stage {
 
 const STATUS: Ask = Ask::Query(Query::Status);
 
+/// An episode with a lesson, up to the training, which is then due.
+///
+/// - `told`: carries out one command and gives the number of its first record.
+fn teach(told: impl Fn(Command) -> Seq) {
+    let say = |text: &str| Command::Say { utterance: text.to_owned() };
+    told(Command::StartEpisode { stage: stage() });
+    let explains = told(say("sterilize the brass bell"));
+    told(say("ring the brass bell"));
+    told(Command::Done);
+    told(Command::Teach { explains, actions: vec![1], on_clash: OnClash::Ask });
+    told(Command::FinishTeaching);
+}
+
 #[test]
 fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
     let (flood, quiet) = (lab("flood"), lab("quiet"));
@@ -185,13 +198,7 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
                 }
             }
         };
-        let say = |text: &str| Command::Say { utterance: text.to_owned() };
-        told(Command::StartEpisode { stage: stage() });
-        let explains = told(say("sterilize the brass bell"));
-        told(say("ring the brass bell"));
-        told(Command::Done);
-        told(Command::Teach { explains, actions: vec![1], on_clash: OnClash::Ask });
-        told(Command::FinishTeaching);
+        teach(told);
     }
     match status(&full, 0) {
         Response::QuotaExceeded(over) => {
@@ -228,13 +235,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
         Response::Reply(reply) => reply.first,
         other => panic!("{other:?}"),
     };
-    let say = |text: &str| Command::Say { utterance: text.to_owned() };
-    told(Command::StartEpisode { stage: stage() });
-    let explains = told(say("sterilize the brass bell"));
-    told(say("ring the brass bell"));
-    told(Command::Done);
-    told(Command::Teach { explains, actions: vec![1], on_clash: OnClash::Ask });
-    told(Command::FinishTeaching);
+    teach(told);
     // Three who wait for the training hold the three places.
     let (sender, waits) = mpsc::channel();
     for _ in 0..3 {

@@ -1,6 +1,8 @@
 //! Getting people's records out of trouble: salvage from a damaged directory, and moving a tenant to
 //! another one.
 
+#[path = "support/chance.rs"]
+mod chance;
 mod support;
 
 use std::collections::BTreeMap;
@@ -17,27 +19,13 @@ use apprentice::replay::{Minds, rebuild};
 use apprentice::service::{Data, Service};
 use apprentice::session::{OnClash, Told};
 use apprentice::store::conformance::{batch, read_all, stream};
-use apprentice::store::{
-    self, AppendError, Entropy, ImportError, OsEntropy, SeededEntropy, Store, open,
-};
+use apprentice::store::{self, AppendError, ImportError, SeededEntropy, Store, open};
 use apprentice::world::Stage;
+use chance::{below, seed};
 use support::toy::Bells;
 
 fn dice() -> SeededEntropy {
-    let given = std::env::var("APPRENTICE_SEED").ok().map(|seed| seed.parse().unwrap());
-    let seed = given.unwrap_or_else(|| {
-        let mut bytes = [0; 8];
-        OsEntropy.fill(&mut bytes);
-        u64::from_be_bytes(bytes)
-    });
-    println!("seed: APPRENTICE_SEED={seed}");
-    SeededEntropy::new(seed)
-}
-
-fn below(dice: &SeededEntropy, bound: usize) -> usize {
-    let mut bytes = [0; 8];
-    dice.fill(&mut bytes);
-    usize::try_from(u64::from_be_bytes(bytes) % bound.max(1) as u64).unwrap()
+    SeededEntropy::new(seed())
 }
 
 fn program<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Command {

@@ -1,5 +1,8 @@
 //! The log after the worst: a process killed while it appends. Damage on the disk is in `damage.rs`.
 
+#[path = "support/chance.rs"]
+mod chance;
+
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -8,7 +11,8 @@ use std::process::{Command, Stdio};
 use apprentice::events::Record;
 use apprentice::ids::{StreamId, TenantId};
 use apprentice::store::conformance::{batch, read_all, stream};
-use apprentice::store::{Entropy, OsEntropy, SeededEntropy, Store, open};
+use apprentice::store::{SeededEntropy, Store, open};
+use chance::{below, seed};
 
 /// Where the child process of the kill test keeps its data.
 const CHILD_DIR: &str = "APPRENTICE_TEST_CHILD_DIR";
@@ -16,27 +20,6 @@ const KILLS: usize = 8;
 const WRITERS: usize = 4;
 
 /// Numbers from a seed that is printed, so that a failure can be repeated.
-struct Dice(SeededEntropy);
-
-impl Dice {
-    fn new() -> Dice {
-        let seed = std::env::var("APPRENTICE_SEED").ok().map(|seed| seed.parse().unwrap());
-        let seed = seed.unwrap_or_else(|| {
-            let mut bytes = [0; 8];
-            OsEntropy.fill(&mut bytes);
-            u64::from_be_bytes(bytes)
-        });
-        println!("seed: APPRENTICE_SEED={seed}");
-        Dice(SeededEntropy::new(seed))
-    }
-
-    fn below(&self, bound: usize) -> usize {
-        let mut bytes = [0; 8];
-        self.0.fill(&mut bytes);
-        usize::try_from(u64::from_be_bytes(bytes) % bound as u64).unwrap()
-    }
-}
-
 /// The child of the kill test: appends for ever, and prints what was acknowledged.
 #[test]
 #[ignore = "only run by nothing_acknowledged_is_lost_when_the_process_is_killed"]
@@ -66,7 +49,7 @@ fn child_that_appends_until_it_is_killed() {
 
 #[test]
 fn nothing_acknowledged_is_lost_when_the_process_is_killed() {
-    let dice = Dice::new();
+    let dice = SeededEntropy::new(seed());
     let dir = tempfile::tempdir().unwrap();
     let mut acknowledged: BTreeMap<(String, u64), String> = BTreeMap::new();
     for round in 0..KILLS {
@@ -77,7 +60,7 @@ fn nothing_acknowledged_is_lost_when_the_process_is_killed() {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut wanted = 1 + dice.below(200);
+        let mut wanted = 1 + below(&dice, 200);
         let before = acknowledged.len();
         for line in BufReader::new(child.stdout.take().unwrap()).lines() {
             let line = line.unwrap();

@@ -2,6 +2,8 @@
 //! inside. Promises and figures stand in `docs/reliability.md`; `cargo xtask crash` and
 //! `cargo xtask powerloss` run as many rounds as wanted.
 
+#[path = "../support/chance.rs"]
+mod chance;
 #[path = "../simulation/dice.rs"]
 mod dice;
 #[path = "../support/mod.rs"]
@@ -18,25 +20,7 @@ mod people;
 mod power;
 mod served;
 
-use apprentice::store::{Entropy, OsEntropy};
-
-/// A number that the environment chooses, or what stands for it.
-fn number(variable: &str, otherwise: u64) -> u64 {
-    let text = std::env::var(variable).ok();
-    text.map_or(otherwise, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{variable} is {text:?}, which is no number"))
-    })
-}
-
-/// A seed that is printed, so that a failure can be tried again; threads and the disk have their
-/// own say in what happens under it.
-fn seed() -> u64 {
-    let mut bytes = [0; 8];
-    OsEntropy.fill(&mut bytes);
-    let seed = number("APPRENTICE_SEED", u64::from_be_bytes(bytes));
-    println!("seed: APPRENTICE_SEED={seed}");
-    seed
-}
+use chance::{number, seed};
 
 #[test]
 fn whenever_it_is_killed_every_acknowledgement_is_found_again() {

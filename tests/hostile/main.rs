@@ -2,6 +2,8 @@
 //! writer wrote. Each case gets a typed error or a value, never a panic, and takes a bounded amount
 //! of memory. `cargo xtask fuzz --cases N --seed S` runs as many as wanted.
 
+#[path = "../support/chance.rs"]
+mod chance;
 #[path = "../support/diary.rs"]
 #[allow(dead_code)]
 mod diary;
@@ -21,27 +23,10 @@ mod process;
 mod socket;
 mod targets;
 
-use apprentice::store::{Entropy, OsEntropy};
+use chance::{number, seed};
 
 #[global_allocator]
 static MEMORY: memory::Counting = memory::Counting;
-
-/// A number that the environment chooses, or what stands for it.
-fn number(variable: &str, otherwise: u64) -> u64 {
-    let text = std::env::var(variable).ok();
-    text.map_or(otherwise, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{variable} is {text:?}, which is no number"))
-    })
-}
-
-/// A seed that is printed, so that a failure can be tried again.
-fn seed() -> u64 {
-    let mut bytes = [0; 8];
-    OsEntropy.fill(&mut bytes);
-    let seed = number("APPRENTICE_SEED", u64::from_be_bytes(bytes));
-    println!("seed: APPRENTICE_SEED={seed}");
-    seed
-}
 
 #[test]
 fn no_bytes_make_a_decoder_panic_or_take_more_memory_than_they_are_worth() {

@@ -4,6 +4,8 @@
 //!
 //! `cargo xtask simulate --seeds N [--seed S]` runs as many seeds as wanted.
 
+#[path = "../support/chance.rs"]
+mod chance;
 #[path = "../support/mod.rs"]
 mod support;
 
@@ -16,6 +18,7 @@ mod people;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use chance::number;
 use house::{Counts, Defect, House};
 use oracle::Broken;
 
@@ -26,13 +29,6 @@ fn moves(seed: u64) -> usize {
 
 /// Seeds of the test command; `APPRENTICE_SEEDS` and `APPRENTICE_SEED` choose others.
 const SEEDS: u64 = 10_000;
-
-fn number(variable: &str, otherwise: u64) -> u64 {
-    let text = std::env::var(variable).ok();
-    text.map_or(otherwise, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{variable} is {text:?}, which is no number"))
-    })
-}
 
 fn run(seed: u64, defect: Defect) -> Result<Counts, Broken> {
     House::new(seed, defect, false).run(moves(seed)).0
