@@ -5,6 +5,7 @@ mod backed;
 pub mod exemplar;
 pub mod features;
 pub mod grammar;
+mod ranges;
 mod semantic;
 pub mod seq2seq;
 mod words;

@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::TrainFault;
+use crate::parser::ranges::{size, within};
 
 /// Every choice of the exemplar parser. Two equal settings, word tables, seeds and lists of
 /// exemplars give the same parser, bit for bit.
@@ -105,34 +106,21 @@ impl Default for ExemplarSettings {
 impl ExemplarSettings {
     /// - errors: a value that no training could use, by name.
     pub fn check(&self) -> Result<(), TrainFault> {
-        let size = |field, value: usize, max: usize| match value {
-            0 => wrong(field, value, format!("between 1 and {max}")),
-            _ if value > max => wrong(field, value, format!("between 1 and {max}")),
-            _ => Ok(()),
-        };
         size("hidden", self.hidden, 1_024)?;
         size("embedding", self.embedding, 1_024)?;
         size("steps_max", self.steps_max, 100_000)?;
         size("nearest", self.nearest, 1_000)?;
-        let range = |field, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
-            true => Ok(()),
-            false => wrong(field, value, format!("between {low} and {high}")),
-        };
-        range("learning_rate", self.learning_rate as f64, 1e-9, 1.0)?;
-        range("weight_decay", self.weight_decay as f64, 0.0, 1.0)?;
-        range("stop_loss", self.stop_loss as f64, 0.0, 100.0)?;
-        range("a_start", self.a_start as f64, -1e3, 1e3)?;
-        range("b_start", self.b_start as f64, -1e3, 1e3)?;
-        range("word_scale", self.word_scale as f64, 0.0, 1e3)?;
-        range("position_scale", self.position_scale as f64, 0.0, 1e3)?;
-        range("fixture_weight", self.fixture_weight as f64, 0.0, 1e3)?;
-        range("precision", self.precision, 0.0, 1.0)?;
-        range("beta", self.beta as f64, 0.0, 2.0)
+        within("learning_rate", self.learning_rate as f64, 1e-9, 1.0)?;
+        within("weight_decay", self.weight_decay as f64, 0.0, 1.0)?;
+        within("stop_loss", self.stop_loss as f64, 0.0, 100.0)?;
+        within("a_start", self.a_start as f64, -1e3, 1e3)?;
+        within("b_start", self.b_start as f64, -1e3, 1e3)?;
+        within("word_scale", self.word_scale as f64, 0.0, 1e3)?;
+        within("position_scale", self.position_scale as f64, 0.0, 1e3)?;
+        within("fixture_weight", self.fixture_weight as f64, 0.0, 1e3)?;
+        within("precision", self.precision, 0.0, 1.0)?;
+        within("beta", self.beta as f64, 0.0, 2.0)
     }
-}
-
-fn wrong<T: ToString>(field: &'static str, value: T, allowed: String) -> Result<(), TrainFault> {
-    Err(TrainFault::Setting { field, value: value.to_string(), allowed })
 }
 
 #[cfg(test)]

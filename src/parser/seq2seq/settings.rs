@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::parser::TrainFault;
+use crate::parser::ranges::{size, within};
 
 /// Every choice of the sequence-to-sequence parser. Two equal settings, word tables and lists of
 /// exemplars give the same parser, bit for bit.
@@ -55,28 +56,16 @@ impl Default for Seq2SeqSettings {
 impl Seq2SeqSettings {
     /// - errors: a value that no training could use, by name.
     pub fn check(&self) -> Result<(), TrainFault> {
-        let size = |field, value: usize, max: usize| match (1..=max).contains(&value) {
-            true => Ok(()),
-            false => wrong(field, value, format!("between 1 and {max}")),
-        };
         size("units", self.units, 512)?;
         size("token", self.token, 512)?;
         size("batch", self.batch, 1_024)?;
         size("epochs_max", self.epochs_max, 10_000)?;
         size("beam", self.beam, 32)?;
-        let range = |field, value: f32, low: f32, high: f32| match (low..=high).contains(&value) {
-            true => Ok(()),
-            false => wrong(field, value, format!("between {low} and {high}")),
-        };
-        range("learning_rate", self.learning_rate, 1e-9, 1.0)?;
-        range("clip", self.clip, 1e-3, 1e6)?;
-        range("stop_loss", self.stop_loss, 0.0, 100.0)?;
-        range("word_scale", self.word_scale, 0.0, 1e3)
+        within("learning_rate", self.learning_rate, 1e-9, 1.0)?;
+        within("clip", self.clip, 1e-3, 1e6)?;
+        within("stop_loss", self.stop_loss, 0.0, 100.0)?;
+        within("word_scale", self.word_scale, 0.0, 1e3)
     }
-}
-
-fn wrong<T: ToString>(field: &'static str, value: T, allowed: String) -> Result<(), TrainFault> {
-    Err(TrainFault::Setting { field, value: value.to_string(), allowed })
 }
 
 #[cfg(test)]
