@@ -53,7 +53,13 @@ impl Default for CheckpointFeed {
 }
 
 impl CheckpointFeed {
-    /// The feed of a data directory; nothing is made before the first checkpoint.
+    /// The feed of a data directory that is open for writing, and the folder that it stands in.
+    pub(super) fn make(data: &Path) -> io::Result<CheckpointFeed> {
+        let feed = CheckpointFeed::of(data, true);
+        make_dir(&data.join("checkpoints")).map(|()| feed)
+    }
+
+    /// The feed of a data directory.
     pub(super) fn of(data: &Path, writable: bool) -> CheckpointFeed {
         CheckpointFeed(Home::Directory { dir: data.join("checkpoints"), writable })
     }

@@ -150,7 +150,8 @@ pub fn open(dir: &Path) -> Result<Store, OpenError> {
         }
     }
     let store = Store::of(Arc::new(log), Arc::new(cache), keys);
-    let checkpoints = Arc::new(CheckpointFeed::of(dir, true));
+    let checkpoints = CheckpointFeed::make(dir).map_err(|error| fail.io(dir, &error))?;
+    let checkpoints = Arc::new(checkpoints);
     Ok(Store { checkpoints, directory: Some(Arc::from(dir)), ..store })
 }
 
