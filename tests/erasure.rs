@@ -1,8 +1,10 @@
 //! A person who is erased is gone from the data directory, and nobody else's records suffer.
 
 use std::fs;
+use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -163,7 +165,7 @@ fn the_command_erases_in_a_closed_directory_and_says_what_it_cannot_reach() {
 }
 
 #[test]
-fn an_erasure_that_a_crash_cut_short_is_recorded_at_the_next_start() {
+fn an_erasure_that_a_crash_cut_short_is_finished_at_the_next_start() {
     let dir = tempfile::tempdir().unwrap();
     let service = serve(dir.path());
     live(&service.connect(user("ada")).unwrap(), "twiddle");
@@ -171,7 +173,9 @@ fn an_erasure_that_a_crash_cut_short_is_recorded_at_the_next_start() {
     let store = store::open(dir.path()).unwrap();
     let stream = store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap();
     store.keys.erase_user_key(&stream).unwrap();
+    fs::write(dir.path().join(store::HISTORY_FILE), CANARIES[0]).unwrap();
     let book = Book::open(store).unwrap();
+    assert!(!dir.path().join(store::HISTORY_FILE).exists(), "what was typed goes too");
     let registry = book.registry(&TenantId::local());
     assert!(registry.erased().contains_key(&stream.key));
     drop(book);
@@ -198,4 +202,42 @@ fn an_erasure_that_nobody_signed_and_a_key_that_came_back_are_seen_by_an_audit()
     let report = audit(dir.path());
     let found = report.streams.iter().find_map(|it| it.difference.clone()).unwrap();
     assert_eq!(found.field, "key", "{found:?}");
+}
+
+/// The program with a tenant's secret in its environment, or without.
+fn program(dir: &Path, secret: Option<&str>, arguments: &[&str], typed: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
+    command.args(arguments).arg("--data").arg(dir);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    secret.map(|secret| command.env("APPRENTICE_TENANT_KEY_LOCAL", secret));
+    let mut child = command.spawn().unwrap();
+    child.stdin.take().unwrap().write_all(typed.as_bytes()).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn with_the_secret_in_the_environment_the_directory_alone_opens_nothing() {
+    let room = tempfile::tempdir().unwrap();
+    let dir = room.path().join("data");
+    let (secret, other) = ("5a".repeat(32), "6b".repeat(32));
+    let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let talked = program(&dir, Some(&secret), &["--seed", "7"], "go to the sink\n");
+    assert!(talked.status.success(), "{}", said(&talked));
+    assert!(!dir.join("keys/local.key").exists(), "no file is made for it");
+    let show = ["log", "show", "--user", "you"];
+    let shown = program(&dir, Some(&secret), &show, "");
+    assert!(String::from_utf8_lossy(&shown.stdout).contains("go to the sink"), "{}", said(&shown));
+    for wrong in [None, Some(&*other)] {
+        let refused = program(&dir, wrong, &show, "");
+        assert!(!refused.status.success() && refused.stdout.is_empty(), "{wrong:?}");
+        assert!(said(&refused).contains("key"), "{}", said(&refused));
+    }
+    fs::write(dir.join("keys/local.key"), format!("{other}\n")).unwrap();
+    fs::set_permissions(dir.join("keys/local.key"), fs::Permissions::from_mode(0o600)).unwrap();
+    let refused = program(&dir, Some(&secret), &show, "");
+    assert!(
+        said(&refused).contains("APPRENTICE_TENANT_KEY_LOCAL and another"),
+        "{}",
+        said(&refused)
+    );
 }

@@ -82,7 +82,7 @@ impl Book {
     }
 
     fn is_open(&self, tenant: &TenantId) -> bool {
-        self.registries.get(tenant).is_some_and(Registry::is_open)
+        self.registry_of(tenant).is_some_and(Registry::is_open)
     }
 
     /// Decides, appends durably, applies, and lets the doors know. Blocks.
@@ -140,9 +140,7 @@ impl Book {
         self.admissions.update(tenant, registry.standing());
         Ok(events)
     }
-}
 
-impl Book {
     /// Closes the segments of a person's stream that are due. A function of the records; repeating
     /// it closes nothing more. Blocks.
     ///
@@ -152,7 +150,7 @@ impl Book {
         if stream.is_tenants() {
             return Ok(0);
         }
-        let next = self.registries.get(tenant).map_or(Seq::FIRST, |r| r.uncovered(stream.key));
+        let next = self.registry_of(tenant).map_or(Seq::FIRST, |r| r.uncovered(stream.key));
         let due = replay::due_segments(&*self.store.log, stream, next, through)
             .map_err(|error| OrderError::Read { tenant: tenant.clone(), error })?;
         let count = due.len();
@@ -226,8 +224,7 @@ impl Book {
 
     fn note_erasure(&mut self, stream: &StreamId) -> Result<PersonErased, OrderError> {
         let tenant = &stream.tenant;
-        if let Some(noted) = self.registries.get(tenant).and_then(|it| it.erased().get(&stream.key))
-        {
+        if let Some(noted) = self.registry_of(tenant).and_then(|it| it.erased().get(&stream.key)) {
             return Ok(noted.clone());
         }
         let read = |error| OrderError::Read { tenant: tenant.clone(), error };
@@ -245,15 +242,18 @@ impl Book {
         Ok(PersonErased { stream: stream.key, last, head, signature })
     }
 
-    /// Records the erasures that a crash cut short after the key was gone.
+    /// Finishes the erasures that a crash cut short after the key was gone.
     fn finish_erasures(&mut self) -> Result<(), OrderError> {
-        let tenants: Vec<TenantId> = self.registries.keys().cloned().collect();
-        for tenant in tenants {
+        for tenant in self.tenants() {
             let erased = self.store.keys.erased(&tenant);
             let erased =
                 erased.map_err(|error| OrderError::Key { tenant: tenant.clone(), error })?;
             for stream in erased {
-                match self.note_erasure(&stream) {
+                if self.registry_of(&tenant).is_some_and(|it| it.erased().contains_key(&stream.key))
+                {
+                    continue;
+                }
+                match self.erase(&stream) {
                     // A key that never sealed anything.
                     Ok(_) | Err(OrderError::NobodyThere { .. }) => {}
                     Err(error) => return Err(error),
@@ -261,6 +261,10 @@ impl Book {
             }
         }
         Ok(())
+    }
+
+    fn registry_of(&self, tenant: &TenantId) -> Option<&Registry> {
+        self.registries.get(tenant)
     }
 }
 

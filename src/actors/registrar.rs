@@ -58,7 +58,7 @@ struct Close {
 struct SignTree {
     tenant: TenantId,
     through: Through,
-    answer: Box<dyn FnOnce(Signed) + Send>,
+    answer: Way<String>,
     _place: OwnedSemaphorePermit,
 }
 
@@ -100,13 +100,7 @@ impl Registrar {
         order: Order,
         answer: impl FnOnce(Obeyed) + Send + 'static,
     ) {
-        let answer = Answer(Some(Box::new(answer)));
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
-            return answer.send(Err(OrderError::Busy));
-        };
-        let answer = Box::new(move |obeyed| answer.send(obeyed));
-        // A queue that is closed drops the order, and a dropped answer says so.
-        self.address.do_send(Obey { tenant, order, answer, _place: place });
+        self.hand_in(answer, |answer, _place| Obey { tenant, order, answer, _place });
     }
 
     /// Closes what is due of a person's stream, some time soon. What is forgotten, because the queue
@@ -117,30 +111,41 @@ impl Registrar {
         }
     }
 
-    /// Signs a tenant's tree, after closing what is due of each of its people's streams; `answer` is
-    /// called once, from another thread, when the checkpoint is kept.
+    /// Signs a tenant's tree, after closing what is due of each of its people's streams; `answer` as
+    /// in [`Registrar::order`], when the checkpoint is kept.
     pub fn checkpoint(
         &self,
         tenant: TenantId,
         through: Through,
         answer: impl FnOnce(Signed) + Send + 'static,
     ) {
-        let answer = Answer(Some(Box::new(answer)));
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
-            return answer.send(Err(OrderError::Busy));
-        };
-        let answer = Box::new(move |signed| answer.send(signed));
-        self.address.do_send(SignTree { tenant, through, answer, _place: place });
+        self.hand_in(answer, |answer, _place| SignTree { tenant, through, answer, _place });
     }
 
     /// Erases a person for whom nobody speaks any more; `answer` as in [`Registrar::order`].
     pub(super) fn erase(&self, stream: StreamId, answer: impl FnOnce(Erased) + Send + 'static) {
+        self.hand_in(answer, |answer, _place| Erase { stream, answer, _place });
+    }
+
+    /// Queues work while there is room for it.
+    ///
+    /// - `work`: the message, from the way back and its place in the queue.
+    fn hand_in<T: 'static, M>(
+        &self,
+        answer: impl FnOnce(Result<T, OrderError>) + Send + 'static,
+        work: impl FnOnce(Way<T>, OwnedSemaphorePermit) -> M,
+    ) where
+        M: Message<Result = ()> + Send + 'static,
+        Clerk: Handler<M>,
+    {
         let answer = Answer(Some(Box::new(answer)));
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
-            return answer.send(Err(OrderError::Busy));
-        };
-        let answer = Box::new(move |erased| answer.send(erased));
-        self.address.do_send(Erase { stream, answer, _place: place });
+        match self.places.clone().try_acquire_owned() {
+            // A queue that is closed drops the work, and a dropped answer says so.
+            Ok(place) => {
+                self.address.do_send(work(Box::new(move |outcome| answer.send(outcome)), place));
+            }
+            Err(_) => answer.send(Err(OrderError::Busy)),
+        }
     }
 
     pub fn admissions(&self) -> &Admissions {

@@ -1,12 +1,9 @@
-use serde::{Deserialize, Serialize};
-
 use crate::events::{Quotas, Role, SegmentClosed};
 use crate::ids::{Digest, PublicKey, Seq, Signature, StreamKey, TenantId};
 
 /// What may be done to a tenant. Doing a thing twice is doing it once: the second time nothing is
 /// recorded, so that whoever lost the answer may ask again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Order {
     /// The tenant is to exist.
     Open,
