@@ -1,14 +1,11 @@
 //! Every verb × every name × every trick × every role.
 
-use apprentice::frontends::wire::{COMMANDS, INTERNAL_COMMANDS, QUERIES};
+use apprentice::frontends::wire::{COMMANDS, INTERNAL_COMMANDS, ORDERS, QUERIES};
 use apprentice::ids::RequestId;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::labs::Lab;
-
-const ORDERS: [&str; 9] =
-    ["list", "add", "admit", "retire", "rotate", "disable", "enable", "set_quotas", "erase"];
 
 /// One message, and whether it can be answered.
 pub struct Attempt {
@@ -157,9 +154,7 @@ pub fn attempts(attacker: &Lab, victim: &Lab) -> Vec<Attempt> {
                     id[8..].copy_from_slice(&count.to_be_bytes());
                     let mut id = RequestId(id);
                     if trick == "a replayed id" {
-                        id = RequestId([0x5a; 16]);
-                        id.0[8..].copy_from_slice(&(count - 1).to_be_bytes());
-                        id.0[0] = 0x5b;
+                        id = victim.said;
                     }
                     let raw = Raw {
                         v: 1,

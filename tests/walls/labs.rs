@@ -10,7 +10,7 @@ use apprentice::frontends::{Client, Counts, CurveKey, Identity, wire};
 use apprentice::ids::{PublicKey, RequestId, StreamId, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::service::{self, Config, Data};
-use apprentice::session::{OnClash, Status};
+use apprentice::session::{Command, OnClash, Status};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
@@ -28,6 +28,8 @@ pub struct Lab {
     pub name: String,
     /// The person whom the other lab knows by name.
     pub known: &'static str,
+    /// The request in which that person said the words of this lab.
+    pub said: RequestId,
     canary: String,
     keys: BTreeMap<&'static str, Key>,
     client: Client,
@@ -86,7 +88,7 @@ impl Service {
 
 pub struct Wire {
     socket: zmq::Socket,
-    waiting: BTreeMap<RequestId, Vec<u8>>,
+    waiting: BTreeMap<RequestId, Vec<Vec<u8>>>,
 }
 
 impl Wire {
@@ -97,14 +99,14 @@ impl Wire {
     /// The bytes of the answer to `id`; others that come first are kept.
     pub fn reply_to(&mut self, id: RequestId) -> Vec<u8> {
         loop {
-            if let Some(reply) = self.waiting.remove(&id) {
+            if let Some(reply) = self.waiting.get_mut(&id).and_then(Vec::pop) {
                 return reply;
             }
             let frames =
                 self.socket.recv_multipart(0).expect("every request with an id is answered");
             let bytes = frames.last().unwrap().clone();
             let (answered, _) = wire::decode_response(&bytes).unwrap();
-            self.waiting.insert(answered, bytes);
+            self.waiting.entry(answered).or_default().push(bytes);
         }
     }
 }
@@ -138,14 +140,16 @@ impl Lab {
             Client::connect_as(&service.0.curve_endpoints()[0], user, identity).unwrap()
         };
         let (client, hidden) = (connect("ada"), connect(&canary));
-        Lab { name: name.to_owned(), known: "ada", canary, keys, client, hidden }
+        let said = RequestId([name.len() as u8; 16]);
+        Lab { name: name.to_owned(), known: "ada", said, canary, keys, client, hidden }
     }
 
     /// Talks and teaches with words of its own.
     pub fn live(&self) {
         for client in [&self.client, &self.hidden] {
             client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 7 }).unwrap();
-            client.say(&self.canary).unwrap();
+            let say = Command::Say { utterance: self.canary.clone() };
+            client.command_again(self.said, say).unwrap();
             client.say("go to the sink").unwrap();
             client.done().unwrap();
             let lesson = client.status().unwrap().to_teach.remove(0);
