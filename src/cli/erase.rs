@@ -25,7 +25,8 @@ Examples:
   apprentice erase --tenant robotics --user ada --connect tcp://robot.example:7117 \
       --key operator.key --server-key server.pub
 
-It can not be taken back, and asks nothing. Doing it again is harmless.
+It can not be taken back, and asks nothing. Given again, it erases whoever bears the name by then, or says that
+nobody does; cut short, it is finished by the next command or service that opens the directory.
 
 Exit codes: 0 erased, 1 it went wrong, 2 there is no such person, or no such directory.")]
 pub struct Arguments {
