@@ -230,7 +230,11 @@ fn with_the_secret_in_the_environment_the_directory_alone_opens_nothing() {
     for wrong in [None, Some(&*other)] {
         let refused = program(&dir, wrong, &show, "");
         assert!(!refused.status.success() && refused.stdout.is_empty(), "{wrong:?}");
-        assert!(said(&refused).contains("key"), "{}", said(&refused));
+        let what = match wrong {
+            None => "has no key file",
+            Some(_) => "APPRENTICE_TENANT_KEY_LOCAL opens the key of nobody",
+        };
+        assert!(said(&refused).contains(what), "{}", said(&refused));
     }
     fs::write(dir.join("keys/local.key"), format!("{other}\n")).unwrap();
     fs::set_permissions(dir.join("keys/local.key"), fs::Permissions::from_mode(0o600)).unwrap();

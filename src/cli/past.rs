@@ -92,13 +92,22 @@ impl Past {
         self.check_tenant(tenant)?;
         let stream = self.store.keys.stream_id(tenant, user).map_err(Failure::bad_input)?;
         match self.store.log.head(&stream).map_err(Failure::failed)?.seq {
-            0 => Err(Failure::bad_input(format!(
+            0 => Err(self.stranger(tenant, user)),
+            _ => Ok(stream),
+        }
+    }
+
+    /// Why there is nothing of `user`: behind another secret everybody is a stranger.
+    fn stranger(&self, tenant: &TenantId, user: &UserId) -> Failure {
+        let recorded = self.store.log.streams(tenant).unwrap_or_default();
+        match self.store.keys.check_opens(tenant, &recorded) {
+            Err(error) => Failure::bad_input(error),
+            Ok(()) => Failure::bad_input(format!(
                 "{} holds no records of user {:?} in tenant {tenant}; name a person who talked \
                  with this directory's service",
                 self.directory.display(),
                 user.as_str()
-            ))),
-            _ => Ok(stream),
+            )),
         }
     }
 }

@@ -38,6 +38,11 @@ pub enum KeyError {
          file {path}; keep the one that its records were sealed with"
     )]
     TwoSecrets { tenant: TenantId, variable: String, path: String },
+    #[error(
+        "the secret of tenant {tenant} in {place} opens the key of nobody in this directory; give \
+         the one that its records were sealed with"
+    )]
+    WrongSecret { tenant: TenantId, place: String },
     #[error("the keys are open for reading only")]
     ReadOnly,
     #[error("the key file {path} cannot be used: {reason}")]
@@ -181,10 +186,14 @@ impl Keys {
         }
         match seen {
             None => Ok(()),
-            Some(()) => Err(malformed(
-                &tenant_path(dir, tenant),
-                "it opens the key of nobody in this directory",
-            )),
+            Some(()) => {
+                let variable = variable_of(tenant);
+                let place = match std::env::var_os(&variable) {
+                    Some(_) => format!("the environment variable {variable}"),
+                    None => format!("the file {}", show(&tenant_path(dir, tenant))),
+                };
+                Err(KeyError::WrongSecret { tenant: tenant.clone(), place })
+            }
         }
     }
 

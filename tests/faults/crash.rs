@@ -69,7 +69,11 @@ impl Place {
         }
         let copy = self.folder.path().join("copy");
         copy_tree(&self.data(), &copy);
-        let opened = store::open(&copy).unwrap_or_else(|error| panic!("{error}"));
+        let opened = store::open(&copy).unwrap_or_else(|error| {
+            let kept = std::env::temp_dir().join(format!("apprentice-kept-{}", std::process::id()));
+            copy_tree(&self.data(), &kept);
+            panic!("{error}; the directory as the kill left it is kept in {}", kept.display())
+        });
         let found = self.people.iter().map(|ledger| check(&opened, ledger)).collect();
         drop(opened);
         std::fs::remove_dir_all(&copy).unwrap();
