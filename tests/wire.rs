@@ -137,6 +137,7 @@ fn evidence() -> Evidence {
             reason: "the mug is not within reach".into(),
         }],
         reranked: 0,
+        answered_by: Vec::new(),
     }
 }
 
@@ -168,6 +169,7 @@ fn status() -> Status {
             utterance: "wash the coffee mug".into(),
             actions_before: 0,
             not_sure: true,
+            guessed: false,
         }],
     }
 }

@@ -14,7 +14,9 @@ use super::life::{Life, Parts};
 use super::meters::{Meters, Usage};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{Ask, Book, Erased, Failure, Growths, Hello, OrderError, Registrar, Response, Submit};
+use super::{
+    AnswerTo, Ask, Book, Erased, Failure, Growths, Hello, OrderError, Registrar, Response, Submit,
+};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
@@ -78,7 +80,7 @@ pub enum ActorsError {
 /// Where front ends hand in requests. Knows no domain.
 #[derive(Clone)]
 pub struct Front {
-    submit: Recipient<Submit>,
+    directory: Recipient<Submit>,
     farewell: Recipient<Farewell>,
     meters: Arc<Meters>,
     archive: Archive,
@@ -105,15 +107,27 @@ impl Front {
         self.farewell.do_send(Farewell { tenant, user, answer: Box::new(answer) });
     }
 
+    /// Counts a request that is not for anybody's actor, until it is answered.
+    ///
+    /// - errors: what to answer, when its tenant has too many in hand, or all together have.
+    pub fn let_in(
+        &self,
+        tenant: &TenantId,
+        ask: &Ask,
+        answer: &mut AnswerTo,
+    ) -> Result<(), Box<Response>> {
+        answer.let_in(self.meters.admit(tenant, ask)?);
+        Ok(())
+    }
+
     pub fn submit(&self, mut submit: Submit) -> Result<(), NotTaken> {
-        match self.meters.admit(&submit.tenant, &submit.ask) {
-            Ok(in_flight) => submit.answer.let_in(in_flight),
-            Err(response) => return Err(NotTaken::Over(Box::new(submit), response)),
+        if let Err(response) = self.let_in(&submit.tenant, &submit.ask, &mut submit.answer) {
+            return Err(NotTaken::Over(Box::new(submit), response));
         }
         if let Ask::Archive(_) = submit.ask {
             return self.archive.ask(submit).map_err(NotTaken::Full);
         }
-        self.submit.try_send(submit).map_err(|error| match error {
+        self.directory.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
             SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
         })
@@ -215,10 +229,13 @@ impl House {
     }
 
     pub fn front(&self) -> Front {
-        let (directory, meters) = (self.directory.clone(), self.meters.clone());
-        let submit = directory.clone().recipient();
-        let archive = self.archive.clone();
-        Front { submit, farewell: directory.recipient(), meters, archive }
+        let directory = self.directory.clone();
+        Front {
+            directory: directory.clone().recipient(),
+            farewell: directory.recipient(),
+            meters: self.meters.clone(),
+            archive: self.archive.clone(),
+        }
     }
 
     /// What became durable, for one listener.

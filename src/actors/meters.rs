@@ -142,7 +142,7 @@ impl Meters {
         let cost = match ask {
             Ask::Command(_) => TOKEN,
             Ask::Query(_) | Ask::Wait { .. } | Ask::Archive(_) => QUERY_COST,
-            // Wakes nobody and reads nothing; orders have a queue of their own.
+            // Wakes nobody; and an operator must get through when the lab's people do not.
             Ask::Hello | Ask::Feed | Ask::Order(_) => return Ok(()),
         };
         let burst = quotas.burst.unwrap_or(rate);

@@ -112,8 +112,8 @@ impl From<OrderError> for Response {
             OrderError::Append { .. }
             | OrderError::Key { .. }
             | OrderError::Read { .. }
-            | OrderError::Disagreement { .. }
-            | OrderError::Evidence { .. } => Response::error(ErrorCode::Unavailable, message),
+            | OrderError::Evidence { .. }
+            | OrderError::Disagreement { .. } => Response::error(ErrorCode::Unavailable, message),
         }
     }
 }

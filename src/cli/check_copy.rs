@@ -1,7 +1,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use rustix::process::{Resource, Rlimit, setrlimit};
+use rustix::process::{
+    Resource, Rlimit, Signal, getppid, set_parent_process_death_signal, setrlimit,
+};
 
 use super::failure::Failure;
 use crate::store;
@@ -15,6 +17,9 @@ pub struct Arguments {
     /// Address space that this process may take, in bytes.
     #[arg(long)]
     memory: u64,
+    /// The process that asked, in whose directory the copy stands.
+    #[arg(long)]
+    parent: i32,
     copy: PathBuf,
 }
 
@@ -32,6 +37,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     limit(Resource::As, arguments.memory)?;
     limit(Resource::Core, 0)?;
+    // Whoever opens the directory next makes another copy in this one's place: nobody may be left
+    // writing into it.
+    set_parent_process_death_signal(Some(Signal::KILL)).map_err(|error| {
+        Failure::failed(format!("this process cannot be bound to the one that asked: {error}"))
+    })?;
+    if getppid().map(|parent| parent.as_raw_nonzero().get()) != Some(arguments.parent) {
+        return Err(Failure::failed("the process that asked is gone"));
+    }
     let part = match arguments.part {
         Part::Log => "log",
         Part::Cache => "cache",

@@ -50,7 +50,8 @@ pub struct Arguments {
     /// and show what primitives and one-shot gain by it. --limit counts rows; episodes are 24 a seed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["protocol", "failures", "cases", "lessons", "teachers"])]
     ablation: Option<PathBuf>,
-    /// The recipe that minds are trained with: default, paper, or a file.
+    /// The recipe that minds are trained with: default, paper, grammar, seq2seq, seq2seq-grammar, or
+    /// a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
     /// Draws rows, scenes and the training seed; without it, seeds 1, 2 and 3 run.

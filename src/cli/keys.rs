@@ -37,7 +37,7 @@ enum Verb {
         /// A key file.
         #[arg(long, value_name = "FILE", conflicts_with = "data")]
         file: Option<PathBuf>,
-        /// A data directory, whose service has a key since it first listened with --curve
+        /// A data directory; the key of its service is made when there is none yet
         /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
@@ -55,14 +55,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         }
         Verb::Show { file: Some(file), .. } => CurveKey::read(&file).map_err(Failure::bad_input)?,
         Verb::Show { file: None, data } => {
-            let file = server_key_file(&data_dir::choose(data)?);
-            CurveKey::read(&file).map_err(|error| match error {
-                crate::frontends::CurveKeyError::Absent { path } => Failure::bad_input(format!(
-                    "there is no key of a service at {path}; it is made when the service first \
-                     listens with `apprentice serve --curve`"
-                )),
-                error => Failure::bad_input(error),
-            })?
+            let directory = data_dir::choose(data)?;
+            data_dir::must_hold_data(&directory)?;
+            CurveKey::read_or_make(&server_key_file(&directory)).map_err(Failure::bad_input)?
         }
     };
     println!("{}", show_key(key.public()));

@@ -366,7 +366,7 @@ impl Client {
         }
         let end = Instant::now() + self.patience + waits;
         let (mut attempt, mut send, mut busy) = (ATTEMPT, true, None);
-        let (mut pause, mut knocked) = (Duration::ZERO, false);
+        let mut pause = Duration::ZERO;
         loop {
             let now = Instant::now();
             if now >= end {
@@ -411,9 +411,7 @@ impl Client {
                 None if !pause.is_zero() => (pause, send) = (Duration::ZERO, true),
                 None => {
                     attempt = ATTEMPT_MAX.min(attempt * 2);
-                    if !std::mem::replace(&mut knocked, true) {
-                        self.find_out()?;
-                    }
+                    self.find_out()?;
                 }
             }
         }

@@ -92,6 +92,7 @@ const RETRY_FULL_MS: u32 = 200;
 const DRAIN: Duration = Duration::from_secs(10);
 /// Messages read before answers are sent again, so that neither direction starves.
 const BURST: usize = 256;
+
 impl Gateway {
     /// Opens all of `doors`.
     ///
@@ -351,7 +352,12 @@ impl Hall {
             let none = || Response::error(ErrorCode::Unavailable, "this service has no feed");
             return self.answer(peer, id, self.feed.as_ref().map_or_else(none, view));
         }
-        let answer = self.answer_to(peer, id);
+        let mut answer = self.answer_to(peer, id);
+        if let Ask::Order(_) = &ask
+            && let Err(response) = self.front.let_in(&caller.tenant(), &ask, &mut answer)
+        {
+            return self.over(answer, *response);
+        }
         let ask = match ask {
             Ask::Order(order) => return self.order(&caller, order, id, answer),
             ask => ask,
@@ -364,20 +370,22 @@ impl Hall {
                 let full = "the service has too many requests in hand";
                 submit.answer.send(Response::busy(full, RETRY_FULL_MS));
             }
-            Err(NotTaken::Over(submit, response)) => {
-                let counter = match *response {
-                    Response::QuotaExceeded(_) => &self.counters.over_quota,
-                    _ => &self.counters.busy,
-                };
-                count(counter);
-                submit.answer.send(*response);
-            }
+            Err(NotTaken::Over(submit, response)) => self.over(submit.answer, *response),
             Err(NotTaken::Closed(submit)) => {
                 self.failure.report("the directory of people is gone");
                 let gone = "the service is being restarted";
                 submit.answer.send(Response::error(ErrorCode::Unavailable, gone));
             }
         }
+    }
+
+    fn over(&self, answer: AnswerTo, response: Response) {
+        let counter = match response {
+            Response::QuotaExceeded(_) => &self.counters.over_quota,
+            _ => &self.counters.busy,
+        };
+        count(counter);
+        answer.send(response);
     }
 
     /// The way back for an answer that is not here yet.

@@ -65,7 +65,10 @@ fn watch(
         let left = end.saturating_duration_since(Instant::now());
         let left_ms = left.as_micros().div_ceil(1_000) as i64;
         match monitor.poll(zmq::POLLIN, left_ms) {
-            Ok(0) if Instant::now() >= end => return Ok(Knock::Silence),
+            Ok(0) if Instant::now() >= end => {
+                let is_broken_off = broken_off >= BROKEN_OFF_MIN;
+                return Ok(if is_broken_off { Knock::BrokenOff } else { Knock::Silence });
+            }
             Ok(0) | Err(zmq::Error::EINTR) => continue,
             Ok(_) => {}
             Err(error) => return Err(error),
@@ -73,7 +76,9 @@ fn watch(
         let frames = monitor.recv_multipart(0)?;
         match frames.first().and_then(|event| meaning(event)) {
             None => {}
-            Some(Knock::BrokenOff) if broken_off + 1 < BROKEN_OFF_MIN => broken_off += 1,
+            // ZeroMQ connects again at once. It may break off before it has read what the other
+            // side is, and find that out at the next attempt: a better answer may follow.
+            Some(Knock::BrokenOff) => broken_off += 1,
             Some(knock) => return Ok(knock),
         }
     }

@@ -274,7 +274,7 @@ impl SemanticParser for Overlap {
         for near in nearest.iter().filter(|near| near.distance <= self.threshold) {
             if candidates.iter().all(|known| known.program != near.program) {
                 let Near { program, distance, number, .. } = near.clone();
-                candidates.push(Scored { program, distance, number, open: false });
+                candidates.push(Scored { program, distance, number, open: false, by: None });
                 exact += usize::from(near.distance == 0.0);
             }
         }

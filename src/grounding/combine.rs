@@ -4,8 +4,8 @@ use super::purpose;
 use super::resolver::resolve;
 use super::settings::Execution;
 use crate::language::{
-    Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol, Word,
-    WordLists,
+    Answerer, Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol,
+    Word, WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
 use crate::world::Domain;
@@ -23,6 +23,8 @@ pub struct Offer<'a> {
     pub seed: bool,
     /// Whether the world says which mention fills which slot.
     pub open: bool,
+    /// Which part of the parser offers it, where it has parts.
+    pub by: Option<Answerer>,
 }
 
 /// How clauses are put together.
@@ -45,6 +47,8 @@ pub struct Candidate {
     pub exact: bool,
     pub verdict: Verdict,
     pub lifted: Vec<LiftedUtterance>,
+    /// Which part of the parser gave each clause's program; empty where it has no parts.
+    pub answered_by: Vec<Answerer>,
     /// What was named last, for a later "it".
     pub mentioned: Option<Symbol>,
 }
@@ -81,6 +85,7 @@ pub fn combine<D: Domain>(
             exact: true,
             verdict: Verdict::Runs { bindings: Vec::new() },
             lifted: Vec::new(),
+            answered_by: Vec::new(),
             mentioned: moment.mentioned.cloned(),
         },
     };
@@ -294,6 +299,8 @@ impl<D: Domain> Ground<'_, D> {
         }
         let mut lifted = so_far.lifted.clone();
         lifted.push(offer.clause.lifted.clone());
+        let mut answered_by = so_far.answered_by.clone();
+        answered_by.extend(offer.by);
         let candidate = Candidate {
             program: Program { steps },
             distance: (self.context.chain)(so_far.distance, offer.distance),
@@ -301,6 +308,7 @@ impl<D: Domain> Ground<'_, D> {
             exact: so_far.exact && offer.exact,
             verdict,
             lifted,
+            answered_by,
             mentioned,
         };
         let literal = partial.literal && offer.seed;

@@ -67,6 +67,12 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         };
         let mut evidence = heard.evidence(told);
         evidence.reranked = reranked;
+        evidence.answered_by = match (&outcome, told) {
+            (Outcome::Understood { .. } | Outcome::Impossible { .. }, Some(told)) => {
+                told.answered_by.clone()
+            }
+            _ => Vec::new(),
+        };
         evidence.discarded = discarded(&candidates, told);
         Answer { outcome, evidence, mentioned }
     }
@@ -181,6 +187,7 @@ impl ParsedClause {
                 distance: scored.distance,
                 exact: place < parse.exact,
                 open: scored.open,
+                by: scored.by,
                 seed: scored.number < seeds,
             }));
         }

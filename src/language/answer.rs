@@ -1,3 +1,5 @@
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::{LiftedProgram, LiftedUtterance, Program, Symbol};
@@ -10,6 +12,17 @@ pub struct Answer {
     pub evidence: Evidence,
     /// The type that the last mention meant: what a later "it" means while the hand is empty.
     pub mentioned: Option<Symbol>,
+}
+
+impl Answer {
+    /// Whether a part that answers whatever is said gave the program, or some of it, for words that
+    /// it was never taught.
+    pub fn guessed(&self) -> bool {
+        let Evidence { lifted, nearest, answered_by, .. } = &self.evidence;
+        let taught = |clause: &LiftedUtterance| nearest.iter().any(|near| near.exemplar == *clause);
+        let clauses = lifted.iter().zip(answered_by);
+        clauses.into_iter().any(|(clause, by)| *by == Answerer::Seq2seq && !taught(clause))
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,6 +49,28 @@ pub struct Evidence {
     pub discarded: Vec<Discarded>,
     /// How many candidates the reranker had to choose from; 0 when it was not asked.
     pub reranked: u32,
+    /// Which part of the parser gave the program, clause by clause as in `lifted`. Empty where
+    /// there is no program, and for parsers that have one part only.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub answered_by: Vec<Answerer>,
+}
+
+/// A part of a parser that answers by itself: in the paper's baseline a grammar answers first, else
+/// a network, and a study counts which (paper: 713 of 793 parses were the grammar's).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answerer {
+    Grammar,
+    Seq2seq,
+}
+
+impl fmt::Display for Answerer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Answerer::Grammar => "the grammar",
+            Answerer::Seq2seq => "the sequence-to-sequence model",
+        })
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,8 +5,10 @@ use super::{Recipe, TrainError};
 use crate::ids::Digest;
 use crate::language::{Clause, Exemplar};
 use crate::parser::{
-    Background, Calibration, ExemplarParser, ExemplarSettings, ExemplarWeights, FeaturesParser,
-    FeaturesSettings, FeaturesWeights, Figures, Parse, SemanticParser, TrainFault,
+    BackedParser, Background, Calibration, ExemplarParser, ExemplarSettings, ExemplarWeights,
+    FeaturesParser, FeaturesSettings, FeaturesWeights, Figures, GrammarParser, GrammarSettings,
+    GrammarWeights, Parse, SemanticParser, Seq2SeqParser, Seq2SeqSettings, Seq2SeqWeights,
+    TrainFault,
 };
 use crate::world::Domain;
 
@@ -15,6 +17,9 @@ use crate::world::Domain;
 pub enum AnyParser {
     Exemplar(Box<ExemplarParser>),
     Features(Box<FeaturesParser>),
+    Grammar(Box<GrammarParser>),
+    Seq2seq(Box<Seq2SeqParser>),
+    Backed(Box<BackedParser>),
 }
 
 /// What a parser of some kind learned, for storing.
@@ -23,6 +28,9 @@ pub enum AnyParser {
 pub enum ParserWeights {
     Exemplar(ExemplarWeights),
     Features(FeaturesWeights),
+    Grammar(GrammarWeights),
+    /// Of both kinds that have a network; a grammar learns nothing.
+    Seq2seq(Seq2SeqWeights),
 }
 
 impl AnyParser {
@@ -47,6 +55,15 @@ impl AnyParser {
                 FeaturesParser::train(settings, words, background, exemplars, count, calibration)
                     .map(|(parser, figures)| (AnyParser::Features(Box::new(parser)), figures))
             }
+            ParserKind::Grammar => GrammarParser::new(grammar(recipe)?, exemplars)
+                .map(|parser| (AnyParser::Grammar(Box::new(parser)), Figures::new())),
+            kind @ (ParserKind::Seq2seq | ParserKind::Backed) => {
+                let (settings, signature) = (seq2seq(recipe)?, domain.signature());
+                let count = seeds.exemplars.len();
+                Seq2SeqParser::train(settings, words, signature, seed, exemplars, count).and_then(
+                    |(model, figures)| Ok((with_grammar(recipe, kind, exemplars, model)?, figures)),
+                )
+            }
         };
         trained.map_err(TrainError::failed)
     }
@@ -70,6 +87,19 @@ impl AnyParser {
                 FeaturesParser::restore(settings, words, background, exemplars, seeds, weights)
                     .map(|parser| AnyParser::Features(Box::new(parser)))
             }
+            (ParserKind::Grammar, ParserWeights::Grammar(GrammarWeights {})) => {
+                GrammarParser::new(grammar(recipe)?, exemplars)
+                    .map(|parser| AnyParser::Grammar(Box::new(parser)))
+            }
+            (
+                kind @ (ParserKind::Seq2seq | ParserKind::Backed),
+                ParserWeights::Seq2seq(weights),
+            ) => {
+                let (settings, signature) = (seq2seq(recipe)?, domain.signature());
+                let seeds = domain.seeds().exemplars.len();
+                Seq2SeqParser::restore(settings, words, signature, exemplars, seeds, weights)
+                    .and_then(|model| with_grammar(recipe, kind, exemplars, model))
+            }
             _ => {
                 let reason = "the weights are of another kind of parser than the recipe's";
                 Err(TrainFault::Weights { reason: reason.to_owned() })
@@ -82,13 +112,25 @@ impl AnyParser {
         match self {
             AnyParser::Exemplar(parser) => ParserWeights::Exemplar(parser.weights().clone()),
             AnyParser::Features(parser) => ParserWeights::Features(parser.weights().clone()),
+            AnyParser::Grammar(_) => ParserWeights::Grammar(GrammarWeights {}),
+            AnyParser::Seq2seq(model) => ParserWeights::Seq2seq(model.weights().clone()),
+            AnyParser::Backed(both) => ParserWeights::Seq2seq(both.model.weights().clone()),
         }
+    }
+
+    /// Whether more than one answer is ever offered for the same words, so that a reranker has
+    /// something to choose from.
+    pub fn offers_choices(&self) -> bool {
+        matches!(self, AnyParser::Exemplar(_) | AnyParser::Features(_))
     }
 
     pub fn exemplars(&self) -> &[Exemplar] {
         match self {
             AnyParser::Exemplar(parser) => parser.exemplars(),
             AnyParser::Features(parser) => parser.exemplars(),
+            AnyParser::Grammar(parser) => parser.exemplars(),
+            AnyParser::Seq2seq(model) => model.exemplars(),
+            AnyParser::Backed(both) => both.model.exemplars(),
         }
     }
 
@@ -96,6 +138,8 @@ impl AnyParser {
         match self {
             AnyParser::Exemplar(parser) => parser.threshold(),
             AnyParser::Features(parser) => parser.threshold(),
+            AnyParser::Grammar(_) => 0.0,
+            AnyParser::Seq2seq(_) | AnyParser::Backed(_) => Seq2SeqParser::THRESHOLD,
         }
     }
 }
@@ -105,6 +149,9 @@ impl SemanticParser for AnyParser {
         match self {
             AnyParser::Exemplar(parser) => parser.parse(clause),
             AnyParser::Features(parser) => parser.parse(clause),
+            AnyParser::Grammar(parser) => parser.parse(clause),
+            AnyParser::Seq2seq(parser) => parser.parse(clause),
+            AnyParser::Backed(parser) => parser.parse(clause),
         }
     }
 
@@ -112,6 +159,9 @@ impl SemanticParser for AnyParser {
         match self {
             AnyParser::Exemplar(parser) => parser.chain(so_far, next),
             AnyParser::Features(parser) => parser.chain(so_far, next),
+            AnyParser::Grammar(parser) => parser.chain(so_far, next),
+            AnyParser::Seq2seq(parser) => parser.chain(so_far, next),
+            AnyParser::Backed(parser) => parser.chain(so_far, next),
         }
     }
 
@@ -119,8 +169,34 @@ impl SemanticParser for AnyParser {
         match self {
             AnyParser::Exemplar(parser) => parser.sure_of_order(),
             AnyParser::Features(parser) => parser.sure_of_order(),
+            AnyParser::Grammar(parser) => parser.sure_of_order(),
+            AnyParser::Seq2seq(parser) => parser.sure_of_order(),
+            AnyParser::Backed(parser) => parser.sure_of_order(),
         }
     }
+}
+
+/// The model, with the grammar before it where the recipe wants both.
+fn with_grammar(
+    recipe: &Recipe,
+    kind: ParserKind,
+    exemplars: &[Exemplar],
+    model: Seq2SeqParser,
+) -> Result<AnyParser, TrainFault> {
+    let grammar = recipe.settings().parser.grammar.as_ref().filter(|_| kind == ParserKind::Backed);
+    let Some(grammar) = grammar else { return Ok(AnyParser::Seq2seq(Box::new(model))) };
+    let grammar = GrammarParser::new(grammar, exemplars)?;
+    Ok(AnyParser::Backed(Box::new(BackedParser { grammar, model })))
+}
+
+fn seq2seq(recipe: &Recipe) -> Result<&Seq2SeqSettings, TrainError> {
+    let settings = recipe.settings().parser.seq2seq.as_ref();
+    settings.ok_or_else(|| TrainError::failed("the recipe has no section [parser.seq2seq]"))
+}
+
+fn grammar(recipe: &Recipe) -> Result<&GrammarSettings, TrainError> {
+    let settings = recipe.settings().parser.grammar.as_ref();
+    settings.ok_or_else(|| TrainError::failed("the recipe has no section [parser.grammar]"))
 }
 
 fn exemplar(recipe: &Recipe) -> Result<&ExemplarSettings, TrainError> {

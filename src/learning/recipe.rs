@@ -7,7 +7,9 @@ use crate::grounding::{Abstraction, Execution, RerankerSettings, Split};
 use crate::ids::Digest;
 use crate::language::Document;
 use crate::numerics::NumericsVersion;
-use crate::parser::{ExemplarSettings, FeaturesSettings, WordTable};
+use crate::parser::{
+    ExemplarSettings, FeaturesSettings, GrammarSettings, Seq2SeqSettings, TrainFault, WordTable,
+};
 
 /// Settings only, with a digest: everything that decides what a mind becomes, beside the lessons.
 #[derive(Debug, Clone)]
@@ -56,6 +58,10 @@ pub struct ParserSettings {
     pub exemplar: Option<ExemplarSettings>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub features: Option<FeaturesSettings>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grammar: Option<GrammarSettings>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seq2seq: Option<Seq2SeqSettings>,
 }
 
 /// The parsers there are.
@@ -66,6 +72,13 @@ pub enum ParserKind {
     Exemplar,
     /// Judges with features and weights learned once; nothing trained per person but thresholds.
     Features,
+    /// A grammar that somebody wrote: exact where it answers, and nothing is learned.
+    Grammar,
+    /// A sequence-to-sequence model with attention and copying, trained on seeds and lessons.
+    Seq2seq,
+    /// The paper's baseline: the grammar first, else the sequence-to-sequence model.
+    #[serde(rename = "seq2seq-grammar")]
+    Backed,
 }
 
 /// A recipe file as it stands: its name is no setting and not part of the digest.
@@ -94,10 +107,15 @@ const PAPER: &str = include_str!("../../data/recipes/paper.toml");
 const DEFAULT: &str = include_str!("../../data/recipes/default.toml");
 /// Trains in a few milliseconds, for tests and simulations.
 const TINY: &str = include_str!("../../data/recipes/tiny.toml");
+// The paper's baseline, and its two halves alone.
+const GRAMMAR: &str = include_str!("../../data/recipes/grammar.toml");
+const SEQ2SEQ: &str = include_str!("../../data/recipes/seq2seq.toml");
+const SEQ2SEQ_GRAMMAR: &str = include_str!("../../data/recipes/seq2seq-grammar.toml");
 
 impl Recipe {
     /// The names of the recipes that ship for people; `tiny` is for tests.
-    pub const BUILTIN: [&'static str; 2] = ["default", "paper"];
+    pub const BUILTIN: [&'static str; 5] =
+        ["default", "paper", "grammar", "seq2seq", "seq2seq-grammar"];
 
     /// The TOML text of a recipe that ships.
     pub fn builtin(name: &str) -> Option<&'static str> {
@@ -105,6 +123,9 @@ impl Recipe {
             "default" => Some(DEFAULT),
             "paper" => Some(PAPER),
             "tiny" => Some(TINY),
+            "grammar" => Some(GRAMMAR),
+            "seq2seq" => Some(SEQ2SEQ),
+            "seq2seq-grammar" => Some(SEQ2SEQ_GRAMMAR),
             _ => None,
         }
     }
@@ -113,8 +134,9 @@ impl Recipe {
     ///   out of range, or an unknown word table.
     pub fn parse(toml: &str) -> Result<Recipe, RecipeError> {
         // Nearly everybody's records carry a recipe that ships, and all of them are read at waking.
-        static SHIPPED: [OnceLock<Recipe>; 3] = [const { OnceLock::new() }; 3];
-        let Some(index) = [DEFAULT, PAPER, TINY].iter().position(|text| *text == toml) else {
+        const TEXTS: [&str; 6] = [DEFAULT, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
+        static SHIPPED: [OnceLock<Recipe>; TEXTS.len()] = [const { OnceLock::new() }; TEXTS.len()];
+        let Some(index) = TEXTS.iter().position(|text| *text == toml) else {
             return Recipe::parse_anew(toml);
         };
         if let Some(recipe) = SHIPPED[index].get() {
@@ -209,7 +231,7 @@ impl RecipeSettings {
     }
 
     fn check_parser(&self) -> Result<(), (&'static str, &'static str, String)> {
-        let ParserSettings { kind, exemplar, features } = &self.parser;
+        let ParserSettings { kind, exemplar, features, grammar, seq2seq } = &self.parser;
         if self.abstraction.split == Split::Verbs && self.abstraction.lists.is_none() {
             let reason = "split is \"verbs\"; expected a section [abstraction.lists], which says \
                           what is a verb";
@@ -219,24 +241,30 @@ impl RecipeSettings {
             let reason = format!("expected a section [{section}] with the settings of that kind");
             Err(("parser", "kind", reason))
         };
-        match (kind, exemplar, features) {
-            (ParserKind::Exemplar, None, _) => absent("parser.exemplar"),
-            (ParserKind::Features, _, None) => absent("parser.features"),
-            (ParserKind::Features, _, _) if self.abstraction.lists.is_none() => {
-                absent("abstraction.lists")
-            }
-            (ParserKind::Exemplar, Some(exemplar), _) => {
-                exemplar.check().map_err(|fault| match fault {
-                    crate::parser::TrainFault::Setting { field, .. } => {
-                        ("parser.exemplar", field, fault.to_string())
-                    }
-                    other => ("parser.exemplar", "", other.to_string()),
-                })
-            }
-            (ParserKind::Features, _, Some(features)) => {
-                features.check().map_err(|(field, reason)| ("parser.features", field, reason))
-            }
+        let fault = |section, fault: TrainFault| match fault {
+            TrainFault::Setting { field, .. } => (section, field, fault.to_string()),
+            other => (section, "", other.to_string()),
+        };
+        if *kind == ParserKind::Exemplar {
+            let Some(exemplar) = exemplar else { return absent("parser.exemplar") };
+            exemplar.check().map_err(|found| fault("parser.exemplar", found))?;
         }
+        if *kind == ParserKind::Features {
+            let Some(features) = features else { return absent("parser.features") };
+            if self.abstraction.lists.is_none() {
+                return absent("abstraction.lists");
+            }
+            features.check().map_err(|(field, reason)| ("parser.features", field, reason))?;
+        }
+        if matches!(kind, ParserKind::Grammar | ParserKind::Backed) {
+            let Some(grammar) = grammar else { return absent("parser.grammar") };
+            grammar.check().map_err(|(field, reason)| ("parser.grammar", field, reason))?;
+        }
+        if matches!(kind, ParserKind::Seq2seq | ParserKind::Backed) {
+            let Some(seq2seq) = seq2seq else { return absent("parser.seq2seq") };
+            seq2seq.check().map_err(|found| fault("parser.seq2seq", found))?;
+        }
+        Ok(())
     }
 }
 
@@ -296,15 +324,32 @@ mod tests {
 
     #[test]
     fn the_recipes_that_ship_are_whole_and_differ() {
-        let digests: Vec<Digest> = ["default", "paper", "tiny"]
+        let names = Recipe::BUILTIN.into_iter().chain(["tiny"]);
+        let digests: BTreeMap<Digest, &str> = names
+            .clone()
             .map(|name| {
                 let recipe = Recipe::parse(Recipe::builtin(name).unwrap()).unwrap();
                 assert_eq!(recipe.name(), name);
-                recipe.digest()
+                (recipe.digest(), name)
             })
-            .to_vec();
-        assert!(digests[0] != digests[1] && digests[1] != digests[2] && digests[0] != digests[2]);
+            .collect();
+        assert_eq!(digests.len(), names.count(), "{digests:?}");
         assert_eq!(Recipe::builtin("nobody's"), None);
+    }
+
+    #[test]
+    fn the_baseline_has_the_grammar_and_the_model_of_its_halves() {
+        let settings = |name| Recipe::parse(Recipe::builtin(name).unwrap()).unwrap().settings;
+        let [whole, grammar, model] = ["seq2seq-grammar", "grammar", "seq2seq"].map(settings);
+        assert_eq!(whole.parser.grammar, grammar.parser.grammar);
+        assert_eq!(whole.parser.seq2seq, model.parser.seq2seq);
+        // And all hear what the paper's parser hears.
+        let paper = settings("paper");
+        for recipe in [whole, grammar, model] {
+            let heard = (recipe.words, recipe.abstraction, recipe.lifting, recipe.execution);
+            let hears = paper.clone();
+            assert_eq!(heard, (hears.words, hears.abstraction, hears.lifting, hears.execution));
+        }
     }
 
     #[test]
@@ -334,7 +379,7 @@ mod tests {
         check("split = \"and\"", "split = \"often\"", "expected one of `and`, `clauses`, `verbs`");
         check("name = \"tiny\"", "name = \"ti ny\"", "expected 1 to 64 letters");
         check("table = \"paper\"", "table = \"none\"", "there is no word table \"none\"");
-        check("kind = \"exemplar\"", "kind = \"oracle\"", "expected `exemplar`");
+        check("kind = \"exemplar\"", "kind = \"oracle\"", "expected one of `exemplar`");
         check("hidden = 8\n", "hidden = 0\n", "a number between 1 and 512");
         check("hidden = 16\n", "hidden = 0\n", "allowed is between 1 and 1024");
         let error = Recipe::parse("name = ").unwrap_err();

@@ -37,7 +37,8 @@ pub fn train<D: Domain>(
     let seed_count = seeds.exemplars.len() as u32;
     let mut mind = Mind::new(recipe.clone(), parser, None, seed_count, report);
     // A parser that is sure of its order asks a reranker only where one form has two programs.
-    let never_asked = mind.parser.sure_of_order() && !clashes(&exemplars);
+    let choices = mind.parser.offers_choices();
+    let never_asked = mind.parser.sure_of_order() && !(choices && clashes(&exemplars));
     if lessons.is_empty() || never_asked {
         return Ok(mind);
     }
@@ -111,7 +112,10 @@ fn seeds_keep_their_programs<S, T>(
             let number = first.number as usize;
             let swallower = match number.checked_sub(seeds.len()).and_then(|i| lessons.get(i)) {
                 Some(lesson) => format!("the lesson {:?}", lesson.utterance.as_str()),
-                None => format!("the seed {:?}", parser.exemplars()[number].utterance.to_string()),
+                None => match parser.exemplars().get(number) {
+                    Some(known) => format!("the seed {:?}", known.utterance.to_string()),
+                    None => "what the parser learned".to_owned(),
+                },
             };
             return Err(TrainError::SeedLost {
                 seed: seed.utterance.to_string(),

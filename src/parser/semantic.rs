@@ -1,4 +1,4 @@
-use crate::language::{Clause, LiftedProgram, Near};
+use crate::language::{Answerer, Clause, LiftedProgram, Near};
 
 /// Pure. Parsers differ only behind this line.
 pub trait SemanticParser {
@@ -37,9 +37,16 @@ pub struct Parse {
 pub struct Scored {
     pub program: LiftedProgram,
     pub distance: f32,
-    /// The exemplar that gave it.
+    /// The exemplar that gave it; [`Scored::OF_NONE`] when the parser made it up.
     pub number: u32,
     /// Whether the slots are only kinds of arguments: which mention fills which is then for the
     /// world to say. Otherwise slot n is the n-th mention.
     pub open: bool,
+    /// Which part of the parser gave it, where it has parts.
+    pub by: Option<Answerer>,
+}
+
+impl Scored {
+    /// The number of a program that no exemplar gave.
+    pub const OF_NONE: u32 = u32::MAX;
 }

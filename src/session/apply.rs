@@ -133,8 +133,22 @@ fn interpret<D: Domain>(
     let episode = state.episode.as_mut().ok_or_else(|| outside(seq, "an episode"))?;
     agree(seq, "actions before", event.actions_before as usize, episode.actions.len())?;
     episode.utterances += 1;
+    let guessed = event.answer.guessed();
+    let unexplained = |not_sure: bool| Unexplained {
+        seq,
+        utterance: event.utterance.clone(),
+        not_sure,
+        guessed,
+        actions_before: event.actions_before,
+        scene: episode.scene.clone(),
+        mentioned: episode.mentioned.clone(),
+        settled: false,
+    };
     match &event.answer.outcome {
         Outcome::Understood { program, bindings } => {
+            // Nobody but the person knows whether a guess was right: wrong ones can be taught.
+            let guess = guessed.then(|| unexplained(false));
+            episode.unexplained.extend(guess);
             let mut scene = D::Scene::clone(&episode.scene);
             for (index, step) in program.steps.iter().enumerate() {
                 let bound =
@@ -151,15 +165,8 @@ fn interpret<D: Domain>(
             episode.scene = Arc::new(scene);
         }
         outcome @ (Outcome::Impossible { .. } | Outcome::NotSure) => {
-            episode.unexplained.push(Unexplained {
-                seq,
-                utterance: event.utterance.clone(),
-                not_sure: matches!(outcome, Outcome::NotSure),
-                actions_before: event.actions_before,
-                scene: episode.scene.clone(),
-                mentioned: episode.mentioned.clone(),
-                settled: false,
-            });
+            let said = unexplained(matches!(outcome, Outcome::NotSure));
+            episode.unexplained.push(said);
         }
     }
     if event.answer.mentioned.is_some() {

@@ -174,8 +174,11 @@ pub struct Teachable {
     pub utterance: String,
     /// Only actions after this number can explain it.
     pub actions_before: u32,
-    /// Whether the answer was NOT-SURE; otherwise it was understood but impossible.
+    /// Whether the answer was NOT-SURE; otherwise it was understood but impossible, or guessed.
     pub not_sure: bool,
+    /// Whether it was taken, perhaps wrongly, for something that nobody taught. Left out if not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub guessed: bool,
 }
 
 /// One exemplar of the present mind, for [`super::Query::Known`].

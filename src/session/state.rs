@@ -74,7 +74,7 @@ pub struct Episode<S, T> {
     pub mentioned: Option<Symbol>,
     pub utterances: u32,
     pub actions: Vec<Action>,
-    /// The utterances that were not carried out, in the order they were said.
+    /// The utterances that were not carried out or guessed, in the order they were said.
     pub unexplained: Vec<Unexplained<S>>,
 }
 
@@ -85,12 +85,15 @@ pub struct Action {
     pub binding: Vec<String>,
 }
 
-/// An utterance that was not carried out, with all that a lesson made of it would need.
+/// An utterance that was not carried out, or only by guess, with all that a lesson made of it would need.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained<S> {
     pub seq: Seq,
     pub utterance: Utterance,
     pub not_sure: bool,
+    /// Whether it was taken for something that nobody taught; see [`Answer::guessed`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub guessed: bool,
     pub actions_before: u32,
     pub scene: Arc<S>,
     pub mentioned: Option<Symbol>,

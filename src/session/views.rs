@@ -64,6 +64,7 @@ fn to_teach<S, T>(episode: &Episode<S, T>) -> Vec<Teachable> {
         utterance: said.utterance.to_string(),
         actions_before: said.actions_before,
         not_sure: said.not_sure,
+        guessed: said.guessed,
     })
     .collect()
 }

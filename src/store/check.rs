@@ -154,6 +154,7 @@ impl Copy {
         let mut child = Command::new(program)
             .arg(CHECK_COMMAND)
             .args(["--part", part.name(), "--memory", &memory.to_string()])
+            .args(["--parent", &std::process::id().to_string()])
             .arg(&self.dir)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

@@ -96,7 +96,9 @@ impl Promise {
 pub fn surety(recipe: &Recipe, distance: f32, threshold: f32) -> f64 {
     let unsure = match recipe.settings().parser.kind {
         ParserKind::Features => f64::from(distance) * f64::from(threshold),
-        ParserKind::Exemplar => f64::from(distance),
+        ParserKind::Exemplar | ParserKind::Grammar | ParserKind::Seq2seq | ParserKind::Backed => {
+            f64::from(distance)
+        }
     };
     (1.0 - unsure).clamp(0.0, 1.0)
 }

@@ -153,8 +153,9 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
 #[test]
 fn a_failed_service_does_not_wait_for_a_training() {
     let gate = Arc::<Gate>::default();
-    // Two people need seven appends each until they are learning; the next is the end.
-    let mut script = vec![Fault::None; 14];
+    // Two people need seven appends each until they are learning, and their tenant one for each
+    // segment that the end of an episode closes; the next is the end.
+    let mut script = vec![Fault::None; 16];
     script.push(Fault::CrashAfter);
     let service = service(&gate, Some(FaultPlan { script, ..FaultPlan::default() }));
     let crowd = Crowd::new(&service);

@@ -164,11 +164,15 @@ pub fn endpoint(socket: &Path) -> String {
     format!("ipc://{}", socket.display())
 }
 
-/// Copies a directory with everything in it.
+/// Copies a directory with everything in it, but for the copy that a start may have been looking at:
+/// its files may go while they are read, and the next start makes another.
 pub fn copy_tree(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
+        if entry.file_name() == "checking" {
+            continue;
+        }
         let target = to.join(entry.file_name());
         match entry.file_type().unwrap().is_dir() {
             true => copy_tree(&entry.path(), &target),

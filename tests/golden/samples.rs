@@ -10,8 +10,8 @@ use apprentice::events::{
 };
 use apprentice::ids::{Digest, PublicKey, Seq, Signature, StreamKey, Timestamp, UserId};
 use apprentice::language::{
-    Answer, Discarded, Document, Evidence, LiftedUtterance, Near, Outcome, Program, Symbol,
-    Utterance,
+    Answer, Answerer, Discarded, Document, Evidence, LiftedUtterance, Near, Outcome, Program,
+    Symbol, Utterance,
 };
 use serde_json::json;
 
@@ -24,6 +24,7 @@ pub fn samples() -> Vec<(&'static str, Event)> {
         ("interpreted", Event::Interpreted(interpreted(understood()))),
         ("interpreted_impossible", Event::Interpreted(interpreted(impossible()))),
         ("interpreted_not_sure", Event::Interpreted(interpreted(Outcome::NotSure))),
+        ("interpreted_by_the_baseline", Event::Interpreted(by_the_baseline())),
         ("episode_ended", Event::EpisodeEnded(episode_ended(Ending::Achieved))),
         ("episode_ended_abandoned", Event::EpisodeEnded(episode_ended(Ending::Abandoned))),
         ("decomposition_taught", Event::DecompositionTaught(taught())),
@@ -78,6 +79,10 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("interpreted.answer.evidence.discarded[].program", "a candidate that was dropped"),
     ("interpreted.answer.evidence.discarded[].reason", "why it was dropped"),
     ("interpreted.answer.evidence.reranked", "candidates the reranker chose from; 0: not asked"),
+    (
+        "interpreted.answer.evidence.answered_by[]",
+        "which part of the parser gave each clause: grammar or seq2seq; absent where it has no parts",
+    ),
     ("interpreted.answer.mentioned", "the type of the last mention, for a later \"it\""),
     ("interpreted.actions_before", "primitives carried out in the episode before"),
     ("interpreted.scene_after", "digest of the scene afterwards"),
@@ -199,6 +204,7 @@ fn interpreted(outcome: Outcome) -> Interpreted {
                     reason: "the Table cannot be picked up".to_owned(),
                 }],
                 reranked: 2,
+                answered_by: Vec::new(),
             },
             mentioned: Some(Symbol::new("Apple")),
         },
@@ -206,6 +212,18 @@ fn interpreted(outcome: Outcome) -> Interpreted {
         scene_after: Digest::of(b"scene after"),
         mind: Digest::of(b"mind"),
     }
+}
+
+fn by_the_baseline() -> Interpreted {
+    let mut event = interpreted(understood());
+    let clauses = ["go to <obj>", "grab <obj>"];
+    event.answer.evidence = Evidence {
+        lifted: clauses.map(LiftedUtterance::parse).to_vec(),
+        threshold: 1.0,
+        answered_by: vec![Answerer::Grammar, Answerer::Seq2seq],
+        ..Evidence::default()
+    };
+    event
 }
 
 fn episode_ended(ending: Ending) -> EpisodeEnded {

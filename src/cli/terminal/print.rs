@@ -1,6 +1,6 @@
 //! What the conversation shows, as text. Pure: every function here only builds strings.
 
-use crate::language::{Answer, Evidence, Near, Outcome, Program};
+use crate::language::{Answer, Answerer, Evidence, Near, Outcome, Program};
 use crate::session::{ActionView, KnownExemplar, Phase, Status, Teachable};
 use crate::world::View;
 
@@ -133,14 +133,19 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
             evidence.lifted.iter().map(|clause| format!("\"{clause}\"")).collect();
         lines.push(format!("I read it as {}.", clauses.join(" and ")));
     }
-    if evidence.nearest.is_empty() {
-        lines.push("I know nothing to compare it with.".to_owned());
-    } else {
+    let mut answered: Vec<Answerer> = evidence.answered_by.clone();
+    answered.dedup();
+    for answerer in &answered {
+        lines.push(sentence(&format!("{answerer} answered")));
+    }
+    if !evidence.nearest.is_empty() {
         lines.push(format!(
             "The nearest things I know (I go along up to a distance of {:.2}):",
             evidence.threshold
         ));
         lines.extend(evidence.nearest.iter().map(|near| nearest(near, evidence.threshold)));
+    } else if answered.is_empty() {
+        lines.push("I know nothing to compare it with.".to_owned());
     }
     for discarded in &evidence.discarded {
         let reason = without_stop(&discarded.reason);
@@ -217,9 +222,10 @@ pub fn status(status: &Status) -> Vec<String> {
 
 /// The question about one utterance, with the actions that it may stand for.
 pub fn teaching_question(said: &Teachable, actions: &[ActionView]) -> Vec<String> {
-    let why = match said.not_sure {
-        true => "I did not understand it",
-        false => "I understood it, but it could not be done",
+    let why = match (said.not_sure, said.guessed) {
+        (true, _) => "I did not understand it",
+        (false, true) => "I guessed what it means",
+        (false, false) => "I understood it, but it could not be done",
     };
     let after = after(said, actions);
     let mut lines = vec![format!("You said \"{}\" and {why}.", said.utterance)];
@@ -359,6 +365,7 @@ mod tests {
                 reason: "the hand is full.".into(),
             }],
             reranked: 2,
+            answered_by: Vec::new(),
         }
     }
 
@@ -485,6 +492,7 @@ mod tests {
             utterance: "wash it".into(),
             actions_before: 1,
             not_sure: true,
+            guessed: false,
         };
         let lines = teaching_question(&said, &[done(1, "a"), done(2, "b"), done(3, "c")]);
         assert_eq!(lines[2..4], ["  2  b", "  3  c"]);

@@ -187,7 +187,13 @@ impl SemanticParser for ExemplarParser {
                 && candidates.len() < CANDIDATES_MAX
                 && candidates.iter().all(|known| known.program != *program)
             {
-                candidates.push(Scored { program: program.clone(), distance, number, open: false });
+                candidates.push(Scored {
+                    program: program.clone(),
+                    distance,
+                    number,
+                    open: false,
+                    by: None,
+                });
                 exact_programs += usize::from(place < exact.len());
             }
         }

@@ -238,6 +238,7 @@ impl FeaturesParser {
             distance,
             number: top.nearest,
             open: true,
+            by: None,
         };
         if nothing_named && self.moves(clause, self.roles.goes(operator)) {
             return vec![idle(0.0)];
@@ -250,6 +251,7 @@ impl FeaturesParser {
                 distance: 1.0 - sigmoid(judged.logit),
                 number: judged.nearest,
                 open: true,
+                by: None,
             })
             .filter(|scored| scored.distance <= self.threshold())
             .collect();
@@ -305,7 +307,7 @@ impl SemanticParser for FeaturesParser {
         let mut deciding: Vec<Scored> = Vec::new();
         for &number in exact {
             let program = self.exemplars[number as usize].program.clone();
-            deciding.push(Scored { program, distance: 0.0, number, open: false });
+            deciding.push(Scored { program, distance: 0.0, number, open: false, by: None });
         }
         let mut offers = Vec::new();
         let mut nearest: Vec<(u32, f32)> = exact.iter().map(|&number| (number, 0.0)).collect();
@@ -320,7 +322,7 @@ impl SemanticParser for FeaturesParser {
                 continue;
             }
             let program = self.exemplars[number as usize].program.clone();
-            let scored = Scored { program, distance, number, open: true };
+            let scored = Scored { program, distance, number, open: true, by: None };
             match exact.is_empty() && p >= self.settings.lesson_decides {
                 true => deciding.push(scored),
                 false => offers.push(scored),

@@ -1,0 +1,98 @@
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::parser::TrainFault;
+
+/// Every choice of the sequence-to-sequence parser. Two equal settings, word tables and lists of
+/// exemplars give the same parser, bit for bit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Seq2SeqSettings {
+    /// Units of each of the three LSTMs: the encoder's two directions and the decoder.
+    pub units: usize,
+    /// Numbers that the decoder is told its last token by.
+    pub token: usize,
+    pub learning_rate: f32,
+    /// Longer gradients are made this long.
+    pub clip: f32,
+    /// Examples per step.
+    pub batch: usize,
+    /// Passes over all examples at most.
+    pub epochs_max: usize,
+    /// Training ends when no example that can be learned costs more than this, in nats for its
+    /// whole program.
+    pub stop_loss: f32,
+    /// Programs that are followed side by side in search of the likeliest.
+    pub beam: usize,
+    /// The word whose vector stands for a sort; else the sort's own name.
+    pub slot_words: BTreeMap<String, String>,
+    /// Word vectors are multiplied by this.
+    pub word_scale: f32,
+    /// Mixed into the training seed.
+    pub salt: String,
+}
+
+impl Default for Seq2SeqSettings {
+    /// Jia and Liang (2016), in small: some dozens of short sentences, not some hundreds.
+    fn default() -> Seq2SeqSettings {
+        Seq2SeqSettings {
+            units: 32,
+            token: 16,
+            learning_rate: 0.01,
+            clip: 5.0,
+            batch: 16,
+            epochs_max: 300,
+            stop_loss: 0.1,
+            beam: 3,
+            slot_words: BTreeMap::from([("obj".to_owned(), "object".to_owned())]),
+            word_scale: 1.0,
+            salt: String::new(),
+        }
+    }
+}
+
+impl Seq2SeqSettings {
+    /// - errors: a value that no training could use, by name.
+    pub fn check(&self) -> Result<(), TrainFault> {
+        let size = |field, value: usize, max: usize| match (1..=max).contains(&value) {
+            true => Ok(()),
+            false => wrong(field, value, format!("between 1 and {max}")),
+        };
+        size("units", self.units, 512)?;
+        size("token", self.token, 512)?;
+        size("batch", self.batch, 1_024)?;
+        size("epochs_max", self.epochs_max, 10_000)?;
+        size("beam", self.beam, 32)?;
+        let range = |field, value: f32, low: f32, high: f32| match (low..=high).contains(&value) {
+            true => Ok(()),
+            false => wrong(field, value, format!("between {low} and {high}")),
+        };
+        range("learning_rate", self.learning_rate, 1e-9, 1.0)?;
+        range("clip", self.clip, 1e-3, 1e6)?;
+        range("stop_loss", self.stop_loss, 0.0, 100.0)?;
+        range("word_scale", self.word_scale, 0.0, 1e3)
+    }
+}
+
+fn wrong<T: ToString>(field: &'static str, value: T, allowed: String) -> Result<(), TrainFault> {
+    Err(TrainFault::Setting { field, value: value.to_string(), allowed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_impossible_setting_is_refused_by_name() {
+        assert_eq!(Seq2SeqSettings::default().check(), Ok(()));
+        let bad = Seq2SeqSettings { beam: 0, ..Seq2SeqSettings::default() };
+        assert_eq!(
+            bad.check().unwrap_err().to_string(),
+            "the parser setting beam is 0; allowed is between 1 and 32"
+        );
+        let bad = Seq2SeqSettings { clip: f32::NAN, ..Seq2SeqSettings::default() };
+        assert!(bad.check().is_err());
+        assert!(serde_json::from_str::<Seq2SeqSettings>(r#"{"beems": 3}"#).is_err());
+    }
+}
