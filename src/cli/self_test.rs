@@ -42,7 +42,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
             })
             .to_string(),
             false => format!(
-                "{:<8} {:<8} {}  {}",
+                "{:<15} {:<8} {}  {}",
                 known.recipe,
                 known.history,
                 known.digest.short(),
