@@ -98,6 +98,19 @@ pub const FRAMES_MAX: usize = 4;
 pub const GATEWAY_IN_FLIGHT_MAX: usize = 8_192;
 /// Requests waiting for the directory. It takes whatever all gateways may have in flight.
 pub const DIRECTORY_QUEUE_MAX: usize = 2 * GATEWAY_IN_FLIGHT_MAX;
+/// Places in the log of one tenant alone that wait to be published; then they are left out, and
+/// followers fetch them.
+pub const GROWTHS_WAITING_MAX: usize = 4_096;
+/// Messages of the feed that wait for one subscriber; then it misses some, and fetches them.
+pub const FEED_WAITING_MAX: i32 = 512;
+/// Questions about the log that wait, of one tenant alone; then an honest `Busy`.
+pub const ARCHIVE_QUEUE_MAX: usize = 64;
+/// Heads of streams in one answer.
+pub const HEADS_IN_REPLY_MAX: usize = 1_000;
+/// Records in one answer.
+pub const RECORDS_IN_REPLY_MAX: usize = 256;
+/// Bytes of records after which an answer ends; its last record may be as large as records are.
+pub const RECORDS_IN_REPLY_BYTES: usize = 256 * 1024;
 /// Nested maps and lists of one wire message; a request needs 4.
 pub const WIRE_DEPTH_MAX: usize = 32;
 

@@ -11,10 +11,12 @@ use std::fs;
 use std::path::PathBuf;
 
 use apprentice::actors::{
-    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, KeyView, Ordered, Quota, QuotaExceeded,
-    Rejected, Response, TenantAsk, TenantVerb, TenantView, Waited,
+    ArchiveAsk, Ask, Busy, ErasedView, ErrorCode, Failed, FeedView, Frame, HeadView, Heads, Hello,
+    KeyView, Ordered, PlainRecords, PlainView, Quota, QuotaExceeded, Rejected, Response,
+    SealedRecords, SealedView, TenantAsk, TenantVerb, TenantView, Waited,
 };
 use apprentice::events::{Ending, PersonErased, Report};
+use apprentice::frontends::FeedMessage;
 use apprentice::frontends::wire::{
     COMMANDS, ORDERS, QUERIES, Request, decode_request, decode_response, encode_request,
     encode_response,
@@ -72,6 +74,13 @@ fn requests() -> Vec<(&'static str, Ask)> {
         ("known", Ask::Query(Query::Known)),
         ("wait", Ask::Wait { seconds: 20 }),
         ("hello", Ask::Hello),
+        ("feed", Ask::Feed),
+        ("heads", Ask::Archive(ArchiveAsk::Heads { after: Some(STREAM), limit: 1000 })),
+        ("records", Ask::Archive(ArchiveAsk::Sealed { stream: STREAM, from: seq(40), limit: 100 })),
+        (
+            "plain_records",
+            Ask::Archive(ArchiveAsk::Plain { stream: STREAM, from: seq(40), limit: 100 }),
+        ),
         ("list", order(None, TenantVerb::List)),
         ("add", give(Order::Open)),
         (
@@ -90,6 +99,8 @@ fn requests() -> Vec<(&'static str, Ask)> {
         ("erase", order(Some(lab()), TenantVerb::Erase { user: UserId::new("grace").unwrap() })),
     ]
 }
+
+const STREAM: StreamKey = StreamKey([7; 16]);
 
 fn lab() -> TenantId {
     TenantId::new("lab-a").unwrap()
@@ -166,6 +177,39 @@ fn status() -> Status {
 fn report() -> Report {
     let figures = BTreeMap::from([("recall".to_owned(), 1.0)]);
     Report { exemplars: 45, threshold: 0.375, figures }
+}
+
+fn sealed() -> SealedView {
+    let frame = Frame(b"APR1...".to_vec());
+    SealedView { stream: STREAM, seq: seq(41), digest: mind(), frame }
+}
+
+fn plain() -> PlainView {
+    PlainView {
+        stream: STREAM,
+        seq: seq(41),
+        at: Timestamp(1_790_000_000_000_000),
+        prev: Digest([0xcd; 32]),
+        digest: mind(),
+        kind: "SessionClosed".into(),
+        event: serde_json::json!({"reason": "the study is over"}),
+    }
+}
+
+/// Messages of the feed, beside their topics.
+fn published() -> Vec<(&'static str, FeedMessage)> {
+    let message = |number, sealed, plain| FeedMessage {
+        v: 1,
+        start: RequestId([5; 16]),
+        number,
+        sealed,
+        plain,
+    };
+    vec![
+        ("feed sealed", message(17, Some(sealed()), None)),
+        ("feed plain", message(17, None, Some(plain()))),
+        ("feed beat", message(17, None, None)),
+    ]
 }
 
 fn responses() -> Vec<(&'static str, Response)> {
@@ -277,6 +321,33 @@ fn responses() -> Vec<(&'static str, Response)> {
                 recipe: "default".into(),
             }),
         ),
+        (
+            "feed answer",
+            Response::Feed(FeedView {
+                start: RequestId([5; 16]),
+                sealed: Some("tcp://192.0.2.7:7200".into()),
+                plain: None,
+            }),
+        ),
+        (
+            "heads answer",
+            Response::Heads(Heads {
+                heads: vec![HeadView { stream: STREAM, seq: seq(41), digest: mind() }],
+                more: false,
+            }),
+        ),
+        (
+            "records answer",
+            Response::Records(SealedRecords { records: vec![sealed()], more: true }),
+        ),
+        (
+            "plain_records answer",
+            Response::PlainRecords(PlainRecords {
+                erased: false,
+                records: vec![plain()],
+                more: false,
+            }),
+        ),
         ("ordered", Response::Ordered(Ordered { tenant: lab(), recorded: 1 })),
         (
             "tenants answer",
@@ -363,7 +434,10 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let request =
         |(name, ask)| (name, encode_request(&Request { id: id(), user: user.clone(), ask }));
     let response = |(name, response)| (name, encode_response(id(), response));
-    requests().into_iter().map(request).chain(responses().into_iter().map(response)).collect()
+    let published = |(name, message): (_, FeedMessage)| (name, message.encode());
+    let (requests, responses) = (requests().into_iter(), responses().into_iter());
+    let both = requests.map(request).chain(responses.map(response));
+    both.chain(crate::published().into_iter().map(published)).collect()
 }
 
 fn page() -> PathBuf {
@@ -429,6 +503,10 @@ fn every_example_is_understood_and_written_back_alike() {
         let read = decode_response(&Value::from_notation(&examples[name]).to_wire())
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(read, (id(), response), "{name}");
+    }
+    for (name, message) in published() {
+        let read = FeedMessage::decode(&Value::from_notation(&examples[name]).to_wire());
+        assert_eq!(read, Ok(message), "{name}");
     }
 }
 

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use super::Growths;
 use super::life::fresh_request;
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};
@@ -15,6 +16,7 @@ pub struct Book {
     store: Store,
     registries: BTreeMap<TenantId, Registry>,
     admissions: Admissions,
+    growths: Growths,
 }
 
 /// Why an order was not carried out.
@@ -49,8 +51,12 @@ pub enum OrderError {
 impl Book {
     /// Folds every tenant's own stream.
     pub fn open(store: Store) -> Result<Book, OrderError> {
-        let mut book =
-            Book { store, registries: BTreeMap::new(), admissions: Admissions::default() };
+        let mut book = Book {
+            store,
+            registries: BTreeMap::new(),
+            admissions: Admissions::default(),
+            growths: Growths::default(),
+        };
         let local = TenantId::local();
         let tenants = book.store.log.tenants();
         let tenants = tenants.map_err(|error| OrderError::Read { tenant: local, error })?;
@@ -69,6 +75,11 @@ impl Book {
 
     pub fn admissions(&self) -> &Admissions {
         &self.admissions
+    }
+
+    /// Who is told of what became durable.
+    pub fn growths(&self) -> &Growths {
+        &self.growths
     }
 
     /// The stream of a person.
@@ -138,6 +149,8 @@ impl Book {
         }
         count_bytes(&self.store, tenant, registry);
         self.admissions.update(tenant, registry.standing());
+        // After the doors know: whoever's key was taken back with this gets no record any more.
+        self.growths.note(&stream, &durable);
         Ok(events)
     }
 

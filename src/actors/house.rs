@@ -6,6 +6,7 @@ use std::time::Duration;
 use actix::dev::SendError;
 use actix::{Actor, Addr, Arbiter, ArbiterHandle, Recipient, SyncArbiter, System};
 
+use super::archive::{Archive, Reader};
 use super::awake::AwakeCount;
 use super::directory::{Address, Directory, People, SleepAll, Waking};
 use super::farewell::Farewell;
@@ -13,7 +14,9 @@ use super::life::{Life, Parts};
 use super::meters::{Meters, Usage};
 use super::trainer::Trainer;
 use super::user::UserActor;
-use super::{AnswerTo, Ask, Book, Erased, Failure, Hello, OrderError, Registrar, Response, Submit};
+use super::{
+    AnswerTo, Ask, Book, Erased, Failure, Growths, Hello, OrderError, Registrar, Response, Submit,
+};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
@@ -25,6 +28,9 @@ pub struct House {
     directory: Addr<Directory>,
     registrar: Registrar,
     meters: Arc<Meters>,
+    growths: Growths,
+    reader: Option<Reader>,
+    archive: Archive,
     system: System,
     thread: Option<JoinHandle<()>>,
     failure: Failure,
@@ -77,6 +83,7 @@ pub struct Front {
     directory: Recipient<Submit>,
     farewell: Recipient<Farewell>,
     meters: Arc<Meters>,
+    archive: Archive,
 }
 
 /// A request that was not taken, given back.
@@ -117,6 +124,9 @@ impl Front {
         if let Err(response) = self.let_in(&submit.tenant, &submit.ask, &mut submit.answer) {
             return Err(NotTaken::Over(Box::new(submit), response));
         }
+        if let Ask::Archive(_) = submit.ask {
+            return self.archive.ask(submit).map_err(NotTaken::Full);
+        }
         self.directory.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
             SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
@@ -148,6 +158,8 @@ impl House {
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
         let book = Book::open(store.clone())?;
         let meters = Arc::new(Meters::new(book.admissions().clone(), store.log.clone()));
+        let growths = book.growths().clone();
+        let reader = Reader::new(store.log.clone());
         let parts = Parts {
             domain,
             store,
@@ -156,10 +168,13 @@ impl House {
             trainers,
             minds: minds.clone(),
             meters: meters.clone(),
+            growths: growths.clone(),
             failure: failure.clone(),
             open: lives.enter(),
         };
         let parts = parts.with_base_mind().map_err(|reason| ActorsError::BaseMind { reason })?;
+        let archive = Archive::start(reader.clone(), lives.enter())
+            .map_err(|error| ActorsError::System { reason: error.to_string() })?;
 
         let (started, ready) = mpsc::channel();
         let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
@@ -199,6 +214,9 @@ impl House {
             directory,
             registrar,
             meters,
+            growths,
+            reader: Some(reader),
+            archive,
             system,
             thread,
             failure,
@@ -216,7 +234,18 @@ impl House {
             directory: directory.clone().recipient(),
             farewell: directory.recipient(),
             meters: self.meters.clone(),
+            archive: self.archive.clone(),
         }
+    }
+
+    /// What became durable, for one listener.
+    pub fn growths(&self) -> &Growths {
+        &self.growths
+    }
+
+    /// Reads what is durable; none after a stop. To be dropped before one.
+    pub fn reader(&self) -> Option<Reader> {
+        self.reader.clone()
     }
 
     /// What each tenant takes, and how often it was turned away.
@@ -258,6 +287,8 @@ impl House {
         let Some(thread) = self.thread.take() else { return };
         self.failure.stop_expected();
         let patience = if self.failure.reason().is_some() { FALL_DOWN } else { FALL_ASLEEP };
+        self.archive.close();
+        self.reader = None;
         self.directory.do_send(SleepAll);
         if !self.awake.wait_for_silence(patience) {
             tracing::warn!(awake = self.awake.now(), "stopping although not everybody sleeps");

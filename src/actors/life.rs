@@ -10,7 +10,7 @@ use actix::Addr;
 use super::awake::Awake;
 use super::meters::Meters;
 use super::trainer::{Run, Seat, Train, Trainer};
-use super::{ErrorCode, Failure, Registrar, Response};
+use super::{ErrorCode, Failure, Growths, Registrar, Response};
 use crate::events::Record;
 use crate::fairness::Trainings;
 use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
@@ -32,6 +32,7 @@ pub(super) struct Parts<D: Domain> {
     pub trainers: usize,
     pub minds: Arc<Minds>,
     pub meters: Arc<Meters>,
+    pub growths: Growths,
     pub failure: Failure,
     pub open: Awake,
 }
@@ -61,6 +62,7 @@ pub(super) struct Life<D: Domain> {
     base: Arc<Mind>,
     minds: Arc<Minds>,
     meters: Arc<Meters>,
+    growths: Growths,
     trainer: OnceLock<Addr<Trainer<D>>>,
     registrar: Registrar,
     trainings: Mutex<Trainings<Train<D>>>,
@@ -77,8 +79,18 @@ impl<D: Domain> Life<D> {
         trainer: impl FnOnce(Arc<Life<D>>, usize) -> Addr<Trainer<D>>,
     ) -> Arc<Life<D>> {
         let Seeded { parts, base } = seeded;
-        let Parts { domain, store, recipe: _, recipe_text, trainers, minds, meters, failure, open } =
-            parts;
+        let Parts {
+            domain,
+            store,
+            recipe: _,
+            recipe_text,
+            trainers,
+            minds,
+            meters,
+            growths,
+            failure,
+            open,
+        } = parts;
         let life = Arc::new(Life {
             domain,
             store,
@@ -86,6 +98,7 @@ impl<D: Domain> Life<D> {
             base,
             minds,
             meters,
+            growths,
             trainer: OnceLock::new(),
             registrar,
             trainings: Mutex::new(Trainings::new(trainers)),
@@ -106,6 +119,11 @@ impl<D: Domain> Life<D> {
     /// Who writes the tenants' own streams.
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
+    }
+
+    /// Who is told of what became durable.
+    pub fn growths(&self) -> &Growths {
+        &self.growths
     }
 
     pub fn failure(&self) -> &Failure {
@@ -233,6 +251,7 @@ pub(super) fn wake<D: Domain>(
             return Err(unavailable(error.to_string()));
         }
     };
+    life.growths.note(stream, &durable);
     session.settle(&durable).map_err(|divergence| unavailable(divergence.to_string()))?;
     session.install(life.base.clone());
     tracing::info!(%stream, "somebody new");

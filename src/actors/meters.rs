@@ -141,9 +141,9 @@ impl Meters {
         let Some(rate) = quotas.utterances_per_second else { return Ok(()) };
         let cost = match ask {
             Ask::Command(_) => TOKEN,
-            Ask::Query(_) | Ask::Wait { .. } => QUERY_COST,
+            Ask::Query(_) | Ask::Wait { .. } | Ask::Archive(_) => QUERY_COST,
             // Wakes nobody; and an operator must get through when the lab's people do not.
-            Ask::Hello | Ask::Order(_) => return Ok(()),
+            Ask::Hello | Ask::Feed | Ask::Order(_) => return Ok(()),
         };
         let burst = quotas.burst.unwrap_or(rate);
         let now_us = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);

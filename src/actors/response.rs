@@ -1,6 +1,8 @@
 use serde::{Deserialize, Serialize};
 
+use super::archive::{ArchiveAsk, Heads, PlainRecords, SealedRecords};
 use super::operator::{ErasedView, Ordered, TenantAsk, TenantView};
+use crate::ids::RequestId;
 use crate::session::{
     Command, KnownExemplar, Query, Rejection, RejectionCode, Reply, Status, Told,
 };
@@ -17,6 +19,10 @@ pub enum Ask {
     },
     /// Who is there. Wakes nobody.
     Hello,
+    /// About the records of one's own tenant. Wakes nobody.
+    Archive(ArchiveAsk),
+    /// Where the feed of one's own tenant is. The doors answer it.
+    Feed,
     /// An operator's, about a tenant. The doors hand it to the registrar, and to nobody's actor.
     Order(TenantAsk),
 }
@@ -31,6 +37,10 @@ pub enum Response {
     Known(Vec<KnownExemplar>),
     Waited(Waited),
     Hello(Hello),
+    Heads(Heads),
+    Records(SealedRecords),
+    PlainRecords(PlainRecords),
+    Feed(FeedView),
     Ordered(Ordered),
     Tenants(Vec<TenantView>),
     Erased(ErasedView),
@@ -64,6 +74,17 @@ pub struct Hello {
     pub domain: String,
     /// The recipe that new people start with.
     pub recipe: String,
+}
+
+/// Where new records are published.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FeedView {
+    /// Names this run of the feed: its numbers begin anew with it.
+    pub start: RequestId,
+    /// The endpoint of sealed records; none when there is no feed, or it is being opened.
+    pub sealed: Option<String>,
+    /// The endpoint of records in the clear; none for whoever may not read them, too.
+    pub plain: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -114,6 +114,8 @@ impl<D: Domain> UserActor<D> {
                 }
             },
             Ask::Wait { seconds } => self.wait(seconds, answer, ctx),
+            Ask::Archive(_) => unreachable!("the archive answers questions about the log"),
+            Ask::Feed => unreachable!("the gateway knows where the feed is"),
             Ask::Hello => unreachable!("the directory answers hello"),
             Ask::Order(_) => unreachable!("the gateway hands orders to the registrar"),
         }
@@ -185,7 +187,10 @@ impl<D: Domain> UserActor<D> {
         let Turn { after, batch } = turn;
         let pending = self.life.log().append(&self.waking.stream, after, batch);
         Box::pin(pending.into_actor(self).map(move |result, actor, ctx| match result {
-            Ok(durable) => actor.settle(&command, &durable, answer, ctx),
+            Ok(durable) => {
+                actor.life.growths().note(&actor.waking.stream, &durable);
+                actor.settle(&command, &durable, answer, ctx);
+            }
             Err(error) => actor.append_failed(error, answer),
         }))
     }

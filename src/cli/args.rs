@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::failure::Failure;
 use super::logging::Logging;
 use super::{
-    audit, check_copy, checkpoint, converse, erase, eval, export, import, keys, log, proof, replay,
-    salvage, self_test, serve, talk, tenant, transcript, verify,
+    audit, check_copy, checkpoint, converse, erase, eval, export, follow, import, keys, log, proof,
+    replay, salvage, self_test, serve, talk, tenant, transcript, verify,
 };
 use crate::store;
 
@@ -68,6 +68,7 @@ enum Verb {
     Checkpoint(checkpoint::Arguments),
     Proof(proof::Arguments),
     Verify(verify::Arguments),
+    Follow(follow::Arguments),
     #[command(hide = true)]
     CheckCopy(check_copy::Arguments),
 }
@@ -113,6 +114,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Checkpoint(arguments)) => checkpoint::run(arguments),
         Some(Verb::Proof(arguments)) => proof::run(arguments),
         Some(Verb::Verify(arguments)) => verify::run(arguments),
+        Some(Verb::Follow(arguments)) => follow::run(arguments),
         Some(Verb::CheckCopy(arguments)) => check_copy::run(&arguments),
     }
 }

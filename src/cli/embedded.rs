@@ -13,6 +13,7 @@ pub struct Wanted {
     pub recipe_text: String,
     pub listen: Vec<String>,
     pub listen_curve: Vec<String>,
+    pub feed: Option<String>,
     pub server_key: Option<PathBuf>,
     pub faults: Option<FaultPlan>,
 }
@@ -25,6 +26,7 @@ impl Wanted {
             recipe_text,
             listen: Vec::new(),
             listen_curve: Vec::new(),
+            feed: None,
             server_key: None,
             faults: None,
         }
@@ -41,9 +43,11 @@ pub fn start(wanted: Wanted) -> Result<Service, Failure> {
     config.faults = wanted.faults;
     config.listen = wanted.listen;
     config.listen_curve = wanted.listen_curve;
+    config.feed = wanted.feed;
     config.server_key = wanted.server_key;
     Service::start(config).map_err(|error| match error {
         StartError::Endpoint(_)
+        | StartError::FeedAlone
         | StartError::ServerKey(_)
         | StartError::Store(_)
         | StartError::Gateway(_) => Failure::bad_input(error),

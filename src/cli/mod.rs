@@ -12,6 +12,7 @@ mod erase;
 mod eval;
 mod export;
 mod failure;
+mod follow;
 mod import;
 mod keys;
 mod log;

@@ -16,6 +16,7 @@ Examples:
   apprentice serve --data lab --zmq tcp://127.0.0.1:7117
   apprentice serve --data lab --zmq ipc:///run/apprentice.socket --log-format json
   apprentice serve --data labs --curve tcp://0.0.0.0:7117
+  apprentice serve --data labs --curve tcp://0.0.0.0:7117 --feed tcp://0.0.0.0:7200
   apprentice serve --data trial --zmq tcp://127.0.0.1:7117 --fault-plan deploy/drills/bad-day.toml
 
 Standard output names the endpoints that were opened, one on a line (a port 0 takes a free one), and
@@ -36,6 +37,10 @@ pub struct Arguments {
     /// `apprentice tenant admit` let in.
     #[arg(long, value_name = "ENDPOINT")]
     curve: Vec<String>,
+    /// Where to publish what is recorded: each lab with auditors or operators gets two endpoints of
+    /// its own, one of sealed records and one of plain ones. With a port, the ports from there on.
+    #[arg(long, value_name = "ENDPOINT", requires = "curve")]
+    feed: Option<String>,
     /// The service's own key, made when missing [default: keys/server.curve in the data directory]
     #[arg(long, value_name = "FILE", requires = "curve")]
     server_key: Option<PathBuf>,
@@ -63,6 +68,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         recipe_text,
         listen: arguments.zmq,
         listen_curve: arguments.curve,
+        feed: arguments.feed,
         server_key: arguments.server_key,
         faults,
     };
@@ -76,6 +82,10 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     for endpoint in service.curve_endpoints() {
         println!("serving with keys at {endpoint}");
         tracing::info!(%endpoint, "serving with keys");
+    }
+    for (tenant, plain, endpoint) in service.feed_endpoints() {
+        let kind = if plain { "plain" } else { "sealed" };
+        println!("{kind} feed of {tenant} at {endpoint}");
     }
     if let Some(key) = service.server_key() {
         println!("server key {}", show_key(key));

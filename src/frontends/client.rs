@@ -5,11 +5,13 @@ use super::knock::{Knock, knock};
 use super::wire::{self, Request};
 use super::{Context, CurveKey, Endpoint, EndpointError, z85};
 use crate::actors::{
-    Ask, ErasedView, Hello, Ordered, Quota, QuotaExceeded, Response, TenantAsk, TenantVerb,
-    TenantView, Waited,
+    ArchiveAsk, Ask, ErasedView, FeedView, HeadView, Heads, Hello, Ordered, PlainRecords, Quota,
+    QuotaExceeded, Response, SealedRecords, TenantAsk, TenantVerb, TenantView, Waited,
 };
-use crate::ids::{PublicKey, RequestId, Seq, TenantId, UserId};
-use crate::limits::{CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, WAIT_S_MAX};
+use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId, UserId};
+use crate::limits::{
+    CLIENT_RETRY_S_MAX, FRAME_BYTES_MAX, HEADS_IN_REPLY_MAX, RECORDS_IN_REPLY_MAX, WAIT_S_MAX,
+};
 use crate::session::{Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status};
 use crate::tenancy::Order;
 use crate::world::{Stage, View};
@@ -95,7 +97,7 @@ const ATTEMPT_MAX: Duration = Duration::from_secs(10);
 const KNOCK: Duration = Duration::from_secs(1);
 
 impl Identity {
-    pub(super) fn put_on(&self, socket: &zmq::Socket) -> zmq::Result<()> {
+    pub fn put_on(&self, socket: &zmq::Socket) -> zmq::Result<()> {
         socket.set_curve_serverkey(&self.server.0)?;
         socket.set_curve_publickey(&self.key.public().0)?;
         socket.set_curve_secretkey(self.key.secret())
@@ -231,6 +233,54 @@ impl Client {
             Response::Known(known) => Ok(known),
             other => Err(self.puzzled(&other)),
         }
+    }
+
+    /// Where new records of this client's tenant are published.
+    pub fn feed(&self) -> Result<FeedView, ClientError> {
+        match self.ask(Ask::Feed)? {
+            Response::Feed(feed) => Ok(feed),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    /// Where all streams of this client's tenant end, in the order of their keys.
+    pub fn heads(&self) -> Result<Vec<HeadView>, ClientError> {
+        let (mut all, limit) = (Vec::<HeadView>::new(), HEADS_IN_REPLY_MAX as u32);
+        loop {
+            let after = all.last().map(|head| head.stream);
+            match self.ask(Ask::Archive(ArchiveAsk::Heads { after, limit }))? {
+                Response::Heads(Heads { heads, more }) => {
+                    let ends = !more || heads.is_empty();
+                    all.extend(heads);
+                    if ends {
+                        return Ok(all);
+                    }
+                }
+                other => return Err(self.puzzled(&other)),
+            }
+        }
+    }
+
+    /// Records of a stream as they are kept, from `from` on; as many as fit an answer.
+    pub fn records(&self, stream: StreamKey, from: Seq) -> Result<SealedRecords, ClientError> {
+        let limit = RECORDS_IN_REPLY_MAX as u32;
+        match self.ask(Ask::Archive(ArchiveAsk::Sealed { stream, from, limit }))? {
+            Response::Records(records) => Ok(records),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    /// As [`Client::records`], in the clear.
+    pub fn plain_records(&self, stream: StreamKey, from: Seq) -> Result<PlainRecords, ClientError> {
+        let limit = RECORDS_IN_REPLY_MAX as u32;
+        match self.ask(Ask::Archive(ArchiveAsk::Plain { stream, from, limit }))? {
+            Response::PlainRecords(records) => Ok(records),
+            other => Err(self.puzzled(&other)),
+        }
+    }
+
+    pub(super) fn identity(&self) -> Option<&Identity> {
+        self.identity.as_ref()
     }
 
     /// Gives an operator's order.
@@ -465,6 +515,9 @@ impl Client {
             Response::Known(_) => "exemplars",
             Response::Waited(_) => "the end of a wait",
             Response::Hello(_) => "a hello",
+            Response::Feed(_) => "where a feed is",
+            Response::Heads(_) => "heads of streams",
+            Response::Records(_) | Response::PlainRecords(_) => "records",
             Response::Ordered(_) => "the end of an order",
             Response::Tenants(_) => "tenants",
             Response::Erased(_) => "an erasure",

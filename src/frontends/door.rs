@@ -1,5 +1,5 @@
 use super::rights::Caller;
-use super::zap::Seal;
+use super::zap::{DOMAIN, Seal};
 use super::{Context, CurveKey, Endpoint, GatewayError, clock, lock};
 use crate::ids::PublicKey;
 use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX};
@@ -67,7 +67,7 @@ impl Door {
         let bolt = match keys {
             None => Bolt::Open,
             Some(Keyed { key, admissions, seal }) => {
-                lock::put_on(&socket, key).map_err(start)?;
+                lock::put_on(&socket, key, DOMAIN).map_err(start)?;
                 Bolt::Keys { admissions, seal }
             }
         };

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::counters::{Counters, count};
 use super::door::{Door, Incoming, Keyed, Sender};
 use super::erasures::{Asked, Erasures};
+use super::feed::{Feed, FeedDoor, Views};
 use super::outbox::{Inbox, Outbox};
 use super::rights::{self, Caller};
 use super::wire::{self, Refused};
@@ -29,6 +30,7 @@ pub struct Gateway {
     stopping: Arc<AtomicBool>,
     outbox: Outbox<Outgoing>,
     thread: Option<JoinHandle<()>>,
+    feed: Option<Feed>,
     // After the gateway's thread has closed its sockets: without it handshakes fail open.
     _doorkeeper: Option<Doorkeeper>,
 }
@@ -49,6 +51,8 @@ pub struct Doors<'a> {
 pub struct LockedDoor<'a> {
     pub endpoints: &'a [Endpoint],
     pub key: &'a CurveKey,
+    /// Where what becomes durable is published.
+    pub feed: Option<FeedDoor<'a>>,
 }
 
 /// Why the gateway did not open.
@@ -108,8 +112,8 @@ impl Gateway {
         let open = door.bind(doors.open)?;
         let mut locked = Vec::new();
         let mut routers = vec![door];
-        let mut doorkeeper = None;
-        if let Some(LockedDoor { endpoints, key }) = doors.locked {
+        let (mut doorkeeper, mut feed) = (None, None);
+        if let Some(LockedDoor { endpoints, key, feed: wanted }) = doors.locked {
             lock::check(zmq::has("curve"))?;
             let (seal, wake) = (Seal::fresh(), outbox.clone());
             let admissions = registrar.admissions().clone();
@@ -122,9 +126,12 @@ impl Gateway {
                 move || wake.wake(),
             );
             doorkeeper = Some(keeper.map_err(start)?);
-            let door = Door::new(context, Some(Keyed { key, admissions, seal }))?;
+            let keyed = Keyed { key, admissions: admissions.clone(), seal };
+            let door = Door::new(context, Some(keyed))?;
             locked = door.bind(endpoints)?;
             routers.push(door);
+            let open = |wanted| Feed::open(context, wanted, key, admissions, failure.clone());
+            feed = wanted.map(open).transpose()?;
         }
         let stopping = Arc::new(AtomicBool::new(false));
         let hall = Hall {
@@ -132,6 +139,7 @@ impl Gateway {
             front,
             registrar,
             erasures: Erasures::new(),
+            feed: feed.as_ref().map(|feed| feed.views().clone()),
             failure: failure.clone(),
             counters: counters.clone(),
             stopping: stopping.clone(),
@@ -156,6 +164,7 @@ impl Gateway {
             stopping,
             outbox,
             thread: Some(thread),
+            feed,
             _doorkeeper: doorkeeper,
         })
     }
@@ -170,6 +179,11 @@ impl Gateway {
         &self.locked
     }
 
+    /// The endpoints of the feed, with their tenants and whether records are in the clear there.
+    pub fn feed_endpoints(&self) -> Vec<(TenantId, bool, String)> {
+        self.feed.as_ref().map(|feed| feed.views().all()).unwrap_or_default()
+    }
+
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
@@ -181,6 +195,10 @@ impl Gateway {
         if let Some(thread) = self.thread.take() {
             // A panic in there was reported by its alarm.
             let _ = thread.join();
+        }
+        // After the last answers: what they say was recorded is published, too.
+        if let Some(feed) = &mut self.feed {
+            feed.close();
         }
     }
 }
@@ -197,6 +215,7 @@ struct Hall {
     front: Front,
     registrar: Registrar,
     erasures: Erasures<ErasedView>,
+    feed: Option<Views>,
     failure: Failure,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
@@ -326,6 +345,12 @@ impl Hall {
         let wire::Request { id, user, ask } = request;
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
+        }
+        if ask == Ask::Feed {
+            let plain = caller.is_one_of(rights::PLAIN);
+            let view = |views: &Views| Response::Feed(views.view(&caller.tenant(), plain));
+            let none = || Response::error(ErrorCode::Unavailable, "this service has no feed");
+            return self.answer(peer, id, self.feed.as_ref().map_or_else(none, view));
         }
         let mut answer = self.answer_to(peer, id);
         if let Ask::Order(_) = &ask

@@ -1,6 +1,5 @@
 //! The lock of a door with keys: ZeroMQ's CURVE (RFC 26).
 
-use super::zap::DOMAIN;
 use super::{CurveKey, GatewayError};
 
 /// What to do about a ZeroMQ without CURVE.
@@ -22,12 +21,14 @@ pub(super) fn check(has: Option<bool>) -> Result<(), GatewayError> {
 
 /// Makes whoever connects to `socket` prove which key they have. Before it is bound; and only the
 /// [`super::zap::Doorkeeper`] holds those keys against the register.
-pub(super) fn put_on(socket: &zmq::Socket, key: &CurveKey) -> zmq::Result<()> {
+///
+/// - `domain`: what the doorkeeper is told of where they knock.
+pub(super) fn put_on(socket: &zmq::Socket, key: &CurveKey, domain: &str) -> zmq::Result<()> {
     socket.set_curve_server(true)?;
     socket.set_curve_publickey(&key.public().0)?;
     socket.set_curve_secretkey(key.secret())?;
     socket.set_handshake_ivl(HANDSHAKE_MS)?;
-    socket.set_zap_domain(DOMAIN)
+    socket.set_zap_domain(domain)
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ mod curve_keys;
 mod door;
 mod endpoint;
 mod erasures;
+mod feed;
+mod follower;
 mod gateway;
 mod knock;
 mod lock;
@@ -22,6 +24,8 @@ pub use client::{Client, ClientError, Identity, fresh_id};
 pub use counters::{Counters, Counts};
 pub use curve_keys::{CurveKey, CurveKeyError, public_file, read_public};
 pub use endpoint::{Endpoint, EndpointError};
+pub use feed::{BEAT, FeedDoor, FeedMessage};
+pub use follower::{FollowError, Followed, Follower, Position};
 pub use gateway::{Doors, Gateway, GatewayError, LockedDoor};
 pub use z85::show as show_key;
 

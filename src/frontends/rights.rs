@@ -1,6 +1,6 @@
 //! Who may ask what. The table stands in `schema/wire.md` too.
 
-use crate::actors::{Ask, ErrorCode, Failed, TenantAsk, TenantVerb};
+use crate::actors::{ArchiveAsk, Ask, ErrorCode, Failed, TenantAsk, TenantVerb};
 use crate::ids::TenantId;
 use crate::tenancy::{Admitted, Order, Role};
 
@@ -14,6 +14,14 @@ pub(super) enum Caller {
 }
 
 impl Caller {
+    /// Whether one of these roles is the caller's.
+    pub fn is_one_of(&self, roles: &[Role]) -> bool {
+        match self {
+            Caller::Local => true,
+            Caller::Keyed(admitted) => roles.contains(&admitted.role),
+        }
+    }
+
     pub fn tenant(&self) -> TenantId {
         match self {
             Caller::Local => TenantId::local(),
@@ -81,11 +89,19 @@ pub(super) fn denied(message: String) -> Failed {
     Failed { code: ErrorCode::Denied, message }
 }
 
+/// Who may have sealed records. A gateway may not: it vouches for its own people only, and records
+/// are of all.
+pub(super) const SEALED: &[Role] = &[Role::Operator, Role::Auditor];
+/// Who may have records in the clear.
+pub(super) const PLAIN: &[Role] = &[Role::Operator];
+
 /// People's words are for their gateway and, for help, their operator; an auditor sees sealed
-/// records only, and those come from the feed.
+/// records only.
 fn roles_for(ask: &Ask) -> &'static [Role] {
     match ask {
         Ask::Hello => &[Role::Gateway, Role::Operator, Role::Auditor],
+        Ask::Archive(ArchiveAsk::Plain { .. }) => PLAIN,
+        Ask::Archive(_) | Ask::Feed => SEALED,
         Ask::Query(_) | Ask::Wait { .. } => &[Role::Gateway, Role::Operator],
         Ask::Command(_) => &[Role::Gateway],
         Ask::Order(_) => &[Role::Operator],
@@ -95,7 +111,7 @@ fn roles_for(ask: &Ask) -> &'static [Role] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ids::{PublicKey, UserId};
+    use crate::ids::{PublicKey, Seq, StreamKey, UserId};
     use crate::session::{Command, Query};
     use crate::tenancy::Quotas;
 
@@ -108,12 +124,27 @@ mod tests {
             Ask::Query(Query::Known),
             Ask::Wait { seconds: 1 },
             Ask::Command(Command::Done),
+            Ask::Feed,
+            Ask::Archive(ArchiveAsk::Heads { after: None, limit: 1 }),
+            Ask::Archive(ArchiveAsk::Sealed {
+                stream: StreamKey::TENANT,
+                from: Seq::FIRST,
+                limit: 1,
+            }),
+            Ask::Archive(ArchiveAsk::Plain {
+                stream: StreamKey::TENANT,
+                from: Seq::FIRST,
+                limit: 1,
+            }),
         ];
         let allowed = |caller: Caller| asks.each_ref().map(|ask| caller.may(ask).is_ok());
-        assert_eq!(allowed(Caller::Local), [true; 4]);
-        assert_eq!(allowed(keyed(Role::Gateway)), [true; 4]);
-        assert_eq!(allowed(keyed(Role::Operator)), [true, true, true, false]);
-        assert_eq!(allowed(keyed(Role::Auditor)), [true, false, false, false]);
+        assert_eq!(allowed(Caller::Local), [true; 8]);
+        let gateway = [true, true, true, true, false, false, false, false];
+        assert_eq!(allowed(keyed(Role::Gateway)), gateway);
+        let operator = [true, true, true, false, true, true, true, true];
+        assert_eq!(allowed(keyed(Role::Operator)), operator);
+        let auditor = [true, false, false, false, true, true, true, false];
+        assert_eq!(allowed(keyed(Role::Auditor)), auditor);
         let failed = keyed(Role::Auditor).may(&Ask::Query(Query::Look)).unwrap_err();
         assert_eq!(failed.code, ErrorCode::Denied);
         assert_eq!(

@@ -8,10 +8,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::orders::WireOrder;
 use crate::actors::{
-    Ask, Busy, ErasedView, ErrorCode, Failed, Hello, Ordered, QuotaExceeded, Rejected, Response,
-    TenantAsk, TenantView, Waited,
+    ArchiveAsk, Ask, Busy, ErasedView, ErrorCode, Failed, FeedView, Heads, Hello, Ordered,
+    PlainRecords, QuotaExceeded, Rejected, Response, SealedRecords, TenantAsk, TenantView, Waited,
 };
-use crate::ids::{RequestId, TenantId, UserId};
+use crate::ids::{RequestId, Seq, StreamKey, TenantId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
 use crate::session::{Command, KnownExemplar, Query, Reply, Status};
 use crate::world::View;
@@ -27,7 +27,8 @@ pub const COMMANDS: [&str; 7] =
 /// Commands that come from inside the service alone.
 pub const INTERNAL_COMMANDS: [&str; 2] = ["open", "finish_retrain"];
 /// The queries, as they are spelled on the wire.
-pub const QUERIES: [&str; 5] = ["look", "known", "status", "wait", "hello"];
+pub const QUERIES: [&str; 9] =
+    ["look", "known", "status", "wait", "hello", "feed", "heads", "records", "plain_records"];
 
 /// A request as it was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,8 +52,58 @@ enum WireQuery {
     Look,
     Known,
     Status,
-    Wait { seconds: u32 },
+    Wait {
+        seconds: u32,
+    },
     Hello,
+    Feed,
+    Heads {
+        #[serde(default)]
+        after: Option<StreamKey>,
+        limit: u32,
+    },
+    Records {
+        stream: StreamKey,
+        from: Seq,
+        limit: u32,
+    },
+    PlainRecords {
+        stream: StreamKey,
+        from: Seq,
+        limit: u32,
+    },
+}
+
+impl WireQuery {
+    fn of_archive(ask: &ArchiveAsk) -> WireQuery {
+        match *ask {
+            ArchiveAsk::Heads { after, limit } => WireQuery::Heads { after, limit },
+            ArchiveAsk::Sealed { stream, from, limit } => {
+                WireQuery::Records { stream, from, limit }
+            }
+            ArchiveAsk::Plain { stream, from, limit } => {
+                WireQuery::PlainRecords { stream, from, limit }
+            }
+        }
+    }
+
+    fn ask(self) -> Ask {
+        Ask::Archive(match self {
+            WireQuery::Look => return Ask::Query(Query::Look),
+            WireQuery::Known => return Ask::Query(Query::Known),
+            WireQuery::Status => return Ask::Query(Query::Status),
+            WireQuery::Wait { seconds } => return Ask::Wait { seconds },
+            WireQuery::Hello => return Ask::Hello,
+            WireQuery::Feed => return Ask::Feed,
+            WireQuery::Heads { after, limit } => ArchiveAsk::Heads { after, limit },
+            WireQuery::Records { stream, from, limit } => {
+                ArchiveAsk::Sealed { stream, from, limit }
+            }
+            WireQuery::PlainRecords { stream, from, limit } => {
+                ArchiveAsk::Plain { stream, from, limit }
+            }
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -135,6 +186,8 @@ pub fn encode_request(request: &Request) -> Vec<u8> {
         Ask::Query(Query::Status) => map.query = Some(WireQuery::Status),
         Ask::Wait { seconds } => map.query = Some(WireQuery::Wait { seconds: *seconds }),
         Ask::Hello => map.query = Some(WireQuery::Hello),
+        Ask::Feed => map.query = Some(WireQuery::Feed),
+        Ask::Archive(ask) => map.query = Some(WireQuery::of_archive(ask)),
         Ask::Order(TenantAsk { tenant, verb }) => {
             (map.order, map.tenant) = (WireOrder::of(verb), tenant.as_ref());
         }
@@ -182,13 +235,7 @@ pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
             check_query(&verb).map_err(|message| refuse(ErrorCode::UnknownVerb, message))?;
             let query = unpack::<QueryField>(bytes)
                 .map_err(|reason| malformed(&format!("query {verb:?}"), reason))?;
-            match query.query {
-                WireQuery::Look => Ask::Query(Query::Look),
-                WireQuery::Known => Ask::Query(Query::Known),
-                WireQuery::Status => Ask::Query(Query::Status),
-                WireQuery::Wait { seconds } => Ask::Wait { seconds },
-                WireQuery::Hello => Ask::Hello,
-            }
+            query.query.ask()
         }
         (None, None, Some(Verb(verb))) => {
             check_order(&verb).map_err(|message| refuse(ErrorCode::UnknownVerb, message))?;
@@ -266,6 +313,14 @@ struct ResponseMap {
     #[serde(skip_serializing_if = "Option::is_none")]
     hello: Option<Hello>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    feed: Option<FeedView>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    heads: Option<Heads>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    records: Option<SealedRecords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plain_records: Option<PlainRecords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     ordered: Option<Ordered>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tenants: Option<Vec<TenantView>>,
@@ -293,6 +348,10 @@ pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
         Response::Known(known) => map.known = Some(known),
         Response::Waited(waited) => map.waited = Some(waited),
         Response::Hello(hello) => map.hello = Some(hello),
+        Response::Feed(feed) => map.feed = Some(feed),
+        Response::Heads(heads) => map.heads = Some(heads),
+        Response::Records(records) => map.records = Some(records),
+        Response::PlainRecords(records) => map.plain_records = Some(records),
         Response::Ordered(ordered) => map.ordered = Some(ordered),
         Response::Tenants(tenants) => map.tenants = Some(tenants),
         Response::Erased(erased) => map.erased = Some(erased),
@@ -320,6 +379,10 @@ pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
         map.known.map(Response::Known),
         map.waited.map(Response::Waited),
         map.hello.map(Response::Hello),
+        map.feed.map(Response::Feed),
+        map.heads.map(Response::Heads),
+        map.records.map(Response::Records),
+        map.plain_records.map(Response::PlainRecords),
         map.ordered.map(Response::Ordered),
         map.tenants.map(Response::Tenants),
         map.erased.map(Response::Erased),
@@ -365,11 +428,11 @@ impl<'de> Deserialize<'de> for Verb {
     }
 }
 
-fn pack<T: Serialize>(value: &T) -> Vec<u8> {
+pub(super) fn pack<T: Serialize>(value: &T) -> Vec<u8> {
     rmp_serde::to_vec_named(value).expect("wire messages are plain data and encode into memory")
 }
 
-fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+pub(super) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let mut decoder = rmp_serde::Deserializer::new(Cursor::new(bytes));
     // Nested maps from a stranger must not overflow the gateway's stack.
     decoder.set_max_depth(WIRE_DEPTH_MAX);

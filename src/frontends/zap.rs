@@ -8,18 +8,64 @@
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use super::Context;
 use super::counters::{Counters, count};
 use super::outbox::{Inbox, Outbox};
+use super::{Context, rights};
 use crate::actors::Failure;
-use crate::ids::PublicKey;
+use crate::ids::{PublicKey, TenantId};
 use crate::sabotage;
-use crate::tenancy::Admissions;
+use crate::tenancy::{Admissions, Admitted};
 
 /// Where ZeroMQ looks for whoever answers; one for each context.
 const ADDRESS: &str = "inproc://zeromq.zap.01";
 /// Names the door with keys in ZeroMQ's questions.
 pub(super) const DOMAIN: &str = "apprentice";
+
+/// Where somebody knocks: ZeroMQ's word is *domain*.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Gate {
+    /// The door with keys, where each message is held against the register again.
+    Door,
+    /// One tenant's feed of sealed records, or of plain ones. What comes out of it is held against
+    /// nothing any more: only those get in who may have all of it.
+    Feed { tenant: TenantId, plain: bool },
+}
+
+impl Gate {
+    pub fn domain(&self) -> String {
+        match self {
+            Gate::Door => DOMAIN.to_owned(),
+            Gate::Feed { tenant, plain: false } => format!("{SEALED_FEED}{tenant}"),
+            Gate::Feed { tenant, plain: true } => format!("{PLAIN_FEED}{tenant}"),
+        }
+    }
+
+    fn read(domain: &[u8]) -> Option<Gate> {
+        let domain = std::str::from_utf8(domain).ok()?;
+        let feed = |prefix, plain| {
+            let tenant = TenantId::new(domain.strip_prefix(prefix)?).ok()?;
+            Some(Gate::Feed { tenant, plain })
+        };
+        match domain == DOMAIN {
+            true => Some(Gate::Door),
+            false => feed(SEALED_FEED, false).or_else(|| feed(PLAIN_FEED, true)),
+        }
+    }
+
+    pub fn lets_in(&self, admitted: &Admitted) -> bool {
+        match self {
+            Gate::Door => true,
+            Gate::Feed { tenant, plain } => {
+                let roles = if *plain { rights::PLAIN } else { rights::SEALED };
+                admitted.tenant == *tenant && roles.contains(&admitted.role)
+            }
+        }
+    }
+}
+
+const SEALED_FEED: &str = "apprentice/sealed/";
+const PLAIN_FEED: &str = "apprentice/plain/";
+
 /// More frames than this are not kept; ZeroMQ itself never sends so many.
 const FRAMES_READ_MAX: usize = 16;
 
@@ -192,14 +238,15 @@ impl<W: Fn()> Desk<W> {
         let [version, _, domain, _, _, mechanism, key] = question else {
             return Err(("500", "not a question about a CURVE key"));
         };
-        if version != b"1.0" || domain != DOMAIN.as_bytes() || mechanism != b"CURVE" {
+        let gate = Gate::read(domain);
+        let (b"1.0", Some(gate), b"CURVE") = (&version[..], gate, &mechanism[..]) else {
             return Err(("500", "not a question about a CURVE key"));
-        }
+        };
         let denied = ("400", "not admitted");
         let key = PublicKey(key.as_slice().try_into().map_err(|_| denied)?);
         match self.admissions.admit(&key, super::clock::now()) {
-            Some(_) => Ok(key),
-            None => Err(denied),
+            Some(admitted) if gate.lets_in(&admitted) => Ok(key),
+            _ => Err(denied),
         }
     }
 }
@@ -207,6 +254,7 @@ impl<W: Fn()> Desk<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tenancy::Role;
 
     /// A doorkeeper, and a socket that asks it what ZeroMQ asks.
     fn desk() -> (Doorkeeper, zmq::Socket, Failure) {
@@ -260,6 +308,28 @@ mod tests {
         let forged = [other.stamp(&key), key.to_string(), format!(":{key}"), String::new()];
         for user_id in forged {
             assert_eq!(seal.key_of(&user_id), None, "{user_id}");
+        }
+    }
+
+    #[test]
+    fn a_feed_lets_in_its_own_tenants_auditors_and_operators_and_the_plain_one_no_auditor() {
+        let [lab, other] = ["lab", "other"].map(|name| TenantId::new(name).unwrap());
+        let feed = |plain| Gate::Feed { tenant: lab.clone(), plain };
+        for gate in [Gate::Door, feed(false), feed(true)] {
+            assert_eq!(Gate::read(gate.domain().as_bytes()), Some(gate));
+        }
+        for domain in ["", "apprentice/", "apprentice/sealed/", "apprentice/plain/../x"] {
+            assert_eq!(Gate::read(domain.as_bytes()), None, "{domain}");
+        }
+        let lets_in = |gate: &Gate, tenant: &TenantId| {
+            [Role::Gateway, Role::Operator, Role::Auditor]
+                .map(|role| gate.lets_in(&Admitted { tenant: tenant.clone(), role }))
+        };
+        assert_eq!(lets_in(&feed(false), &lab), [false, true, true]);
+        assert_eq!(lets_in(&feed(true), &lab), [false, true, false]);
+        for gate in [feed(false), feed(true)] {
+            assert_eq!(lets_in(&gate, &other), [false; 3]);
+            assert_eq!(lets_in(&gate, &TenantId::local()), [false; 3]);
         }
     }
 }

@@ -12,11 +12,11 @@ use crate::actors::{
 };
 use crate::frontends::{
     Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
-    Gateway, GatewayError, LockedDoor,
+    FeedDoor, Gateway, GatewayError, LockedDoor,
 };
 use crate::ids::{PublicKey, TenantId, UserId};
 use crate::learning::Recipe;
-use crate::limits::AWAKE_USERS_MAX;
+use crate::limits::{AWAKE_USERS_MAX, FEED_WAITING_MAX};
 use crate::store::{self, FaultPlan};
 use crate::world::Domain;
 
@@ -33,6 +33,11 @@ pub struct Config<D: Domain> {
     pub listen: Vec<String>,
     /// Endpoints where only those come in whose key was admitted; any address will do.
     pub listen_curve: Vec<String>,
+    /// Where what becomes durable is published: the first endpoint, after which the others follow.
+    /// Followers catch up at an endpoint of `listen_curve`, which must be there.
+    pub feed: Option<String>,
+    /// Messages of the feed that wait for one subscriber before it misses some.
+    pub feed_waiting_max: i32,
     /// The file of the service's own CURVE key, made when missing; none: `keys/server.curve` in the
     /// data directory.
     pub server_key: Option<PathBuf>,
@@ -57,6 +62,11 @@ pub enum Data {
 pub enum StartError {
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
+    #[error(
+        "a feed lets in only those with a key, who catch up at a door with keys; open one, too \
+         (`--curve tcp://ADDRESS:PORT`)"
+    )]
+    FeedAlone,
     #[error(transparent)]
     ServerKey(#[from] CurveKeyError),
     #[error(transparent)]
@@ -97,6 +107,8 @@ impl<D: Domain> Config<D> {
             recipe_text: recipe.to_owned(),
             listen: Vec::new(),
             listen_curve: Vec::new(),
+            feed: None,
+            feed_waiting_max: FEED_WAITING_MAX,
             server_key: None,
             trainers: cores(),
             awake_max: AWAKE_USERS_MAX,
@@ -117,6 +129,10 @@ impl Service {
         let open: Vec<Endpoint> = open.collect::<Result<_, _>>()?;
         let locked = config.listen_curve.iter().map(|text| Endpoint::parse(text));
         let locked: Vec<Endpoint> = locked.collect::<Result<_, _>>()?;
+        let feed = config.feed.as_deref().map(Endpoint::parse).transpose()?;
+        if feed.is_some() && locked.is_empty() {
+            return Err(StartError::FeedAlone);
+        }
         let failure = Failure::default();
         let store = match &config.data {
             Data::Directory(path) => store::open(path)?,
@@ -145,7 +161,12 @@ impl Service {
             failure: failure.clone(),
         })?;
         let context = Context::new();
-        let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key });
+        let waiting_max = config.feed_waiting_max;
+        let feed = feed.as_ref().zip(house.reader()).map(|(endpoint, reader)| {
+            let growths = house.growths().clone();
+            FeedDoor { endpoint, waiting_max, growths, reader }
+        });
+        let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key, feed });
         let doors = Doors { inner: INNER, open: &open, locked };
         let (front, registrar) = (house.front(), house.registrar().clone());
         let gateway = Gateway::open(&context, doors, front, registrar, failure.clone())?;
@@ -171,6 +192,11 @@ impl Service {
     /// The endpoints with keys.
     pub fn curve_endpoints(&self) -> &[String] {
         self.gateway.locked_endpoints()
+    }
+
+    /// The endpoints of the feed now, with their tenants and whether records are in the clear there.
+    pub fn feed_endpoints(&self) -> Vec<(TenantId, bool, String)> {
+        self.gateway.feed_endpoints()
     }
 
     /// Where orders about tenants are handed in from inside the process.

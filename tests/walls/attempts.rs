@@ -68,6 +68,10 @@ fn verbs(victim: &Lab) -> Vec<(Kind, String, Value)> {
         "open" => json!({"user": "ada", "recipe_text": "", "mind": "00".repeat(32)}),
         "finish_retrain" => json!({"recipe": "00".repeat(32), "outcome": {"Err": "no"}}),
         "wait" => json!({"seconds": 0}),
+        "heads" => json!({"after": null, "limit": 1000}),
+        "records" | "plain_records" => {
+            json!({"stream": victim.person().to_hex(), "from": 1, "limit": 100})
+        }
         "admit" => json!({"key": "11".repeat(32), "role": "operator", "label": "mine"}),
         "retire" => json!({"key": victim.public("gateway").to_hex(), "overlap_seconds": 0}),
         "rotate" => json!({

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use apprentice::actors::Ask;
+use apprentice::actors::{ArchiveAsk, Ask, Response};
 use apprentice::frontends::{Client, Counts, CurveKey, Identity, wire};
-use apprentice::ids::{PublicKey, RequestId, StreamId, TenantId, UserId};
+use apprentice::ids::{PublicKey, RequestId, StreamId, StreamKey, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::service::{self, Config, Data};
 use apprentice::session::{Command, OnClash, Status};
@@ -32,6 +32,8 @@ pub struct Lab {
     pub said: RequestId,
     canary: String,
     keys: BTreeMap<&'static str, Key>,
+    /// The stream of one of its people, once they have talked.
+    person: StreamKey,
     client: Client,
     /// A person whose very name is the canary.
     hidden: Client,
@@ -141,11 +143,20 @@ impl Lab {
         };
         let (client, hidden) = (connect("ada"), connect(&canary));
         let said = RequestId([name.len() as u8; 16]);
-        Lab { name: name.to_owned(), known: "ada", said, canary, keys, client, hidden }
+        Lab {
+            name: name.to_owned(),
+            known: "ada",
+            said,
+            canary,
+            person: StreamKey::TENANT,
+            keys,
+            client,
+            hidden,
+        }
     }
 
     /// Talks and teaches with words of its own.
-    pub fn live(&self) {
+    pub fn live(&mut self, service: &Service) {
         for client in [&self.client, &self.hidden] {
             client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 7 }).unwrap();
             let say = Command::Say { utterance: self.canary.clone() };
@@ -157,6 +168,17 @@ impl Lab {
             client.finish_teaching().unwrap();
             client.wait_until_learned(BOUND).unwrap();
             client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 8 }).unwrap();
+        }
+        let id = RequestId([0x78; 16]);
+        let (user, ask) = (
+            UserId::new("auditor").unwrap(),
+            Ask::Archive(ArchiveAsk::Heads { after: Some(StreamKey::TENANT), limit: 10 }),
+        );
+        let mut wire = service.wire(&self.keys["auditor"]);
+        wire.send(&[wire::encode_request(&wire::Request { id, user, ask })]);
+        match wire::decode_response(&wire.reply_to(id)).unwrap() {
+            (_, Response::Heads(heads)) => self.person = heads.heads[0].stream,
+            (_, other) => panic!("no heads: {other:?}"),
         }
     }
 
@@ -184,6 +206,11 @@ impl Lab {
 
     pub fn public(&self, key: &str) -> PublicKey {
         PublicKey(self.keys[key].pair.public_key)
+    }
+
+    /// The stream of one of its people.
+    pub fn person(&self) -> StreamKey {
+        self.person
     }
 
     /// A stream's name as it stands in logs and proofs.

@@ -24,10 +24,10 @@ fn no_attempt_to_cross_brings_out_or_changes_anything_of_another_lab() {
     let lines = Lines::record();
     let dir = tempfile::tempdir().unwrap();
     let service = Service::start(dir.path());
-    let attacker = Lab::found(&service, "atoll");
-    let victim = Lab::found(&service, "borough");
-    attacker.live();
-    victim.live();
+    let mut attacker = Lab::found(&service, "atoll");
+    let mut victim = Lab::found(&service, "borough");
+    attacker.live(&service);
+    victim.live(&service);
     let before = victim.facts(&service);
 
     let attempts = attempts(&attacker, &victim);

@@ -1,0 +1,324 @@
+//! What the log holds, for auditors and operators: read apart from the actors, and by turns.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::Value;
+
+use super::awake::Awake;
+use super::{Ask, ErrorCode, Response, Submit};
+use crate::events::{Header, Record};
+use crate::fairness::{Room, Turns};
+use crate::ids::{Digest, Seq, StreamId, StreamKey, TenantId, Timestamp};
+use crate::limits::{
+    ARCHIVE_QUEUE_MAX, HEADS_IN_REPLY_MAX, RECORDS_IN_REPLY_BYTES, RECORDS_IN_REPLY_MAX,
+};
+use crate::replay;
+use crate::store::{EventLog, ReadError};
+
+/// A question about what a tenant's log holds. Whose log: that of whoever asks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ArchiveAsk {
+    /// Where the streams end, those after `after` in the order of their keys.
+    Heads { after: Option<StreamKey>, limit: u32 },
+    /// Records as they are kept.
+    Sealed { stream: StreamKey, from: Seq, limit: u32 },
+    /// Records opened.
+    Plain { stream: StreamKey, from: Seq, limit: u32 },
+}
+
+/// Where a stream ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HeadView {
+    pub stream: StreamKey,
+    pub seq: Seq,
+    pub digest: Digest,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Heads {
+    pub heads: Vec<HeadView>,
+    /// There are more streams after the last of these.
+    pub more: bool,
+}
+
+/// A record as it is kept.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SealedView {
+    pub stream: StreamKey,
+    pub seq: Seq,
+    pub digest: Digest,
+    pub frame: Frame,
+}
+
+/// Header and sealed body of a record: what its digest is over.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Frame(pub Vec<u8>);
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SealedRecords {
+    pub records: Vec<SealedView>,
+    /// There are more records after the last of these.
+    pub more: bool,
+}
+
+/// A record in the clear.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlainView {
+    pub stream: StreamKey,
+    pub seq: Seq,
+    pub at: Timestamp,
+    pub prev: Digest,
+    pub digest: Digest,
+    pub kind: String,
+    pub event: Value,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlainRecords {
+    /// The person was erased: nobody can open these records any more.
+    pub erased: bool,
+    pub records: Vec<PlainView>,
+    pub more: bool,
+}
+
+impl SealedView {
+    /// Holds the record against its digest and its predecessor's, without a key.
+    ///
+    /// - errors: a sentence; the record is then not what it says it is.
+    pub fn check(&self, prev: Digest) -> Result<(), String> {
+        let SealedView { stream, seq, digest, frame } = self;
+        let wrong = |what: &str| Err(format!("record {seq} of stream {stream}: {what}"));
+        let (header, _, found) = match Header::unframe(&frame.0) {
+            Ok(read) => read,
+            Err(error) => return wrong(&error.to_string()),
+        };
+        if found != *digest {
+            return wrong("its bytes have another digest");
+        }
+        if header.stream != *stream || header.seq != *seq {
+            return wrong("its header is another record's");
+        }
+        match header.prev == prev {
+            true => Ok(()),
+            false => wrong("it follows on another record"),
+        }
+    }
+}
+
+impl Serialize for Frame {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_bytes(&self.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for Frame {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Frame, D::Error> {
+        struct Visitor;
+        impl serde::de::Visitor<'_> for Visitor {
+            type Value = Frame;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("bytes")
+            }
+            fn visit_bytes<E: serde::de::Error>(self, bytes: &[u8]) -> Result<Frame, E> {
+                Ok(Frame(bytes.to_vec()))
+            }
+        }
+        deserializer.deserialize_bytes(Visitor)
+    }
+}
+
+impl std::fmt::Debug for Frame {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Frame({} bytes)", self.0.len())
+    }
+}
+
+/// Reads what is durable. Blocks.
+#[derive(Clone)]
+pub struct Reader {
+    log: Arc<dyn EventLog>,
+}
+
+impl std::fmt::Debug for Reader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Reader(..)")
+    }
+}
+
+impl Reader {
+    pub(super) fn new(log: Arc<dyn EventLog>) -> Reader {
+        Reader { log }
+    }
+
+    pub fn heads(
+        &self,
+        tenant: &TenantId,
+        after: Option<StreamKey>,
+        limit: u32,
+    ) -> Result<Heads, ReadError> {
+        let limit = (limit as usize).clamp(1, HEADS_IN_REPLY_MAX);
+        let mut streams = self.log.streams(tenant)?;
+        streams.retain(|stream| after.is_none_or(|after| stream.key > after));
+        let more = streams.len() > limit;
+        let mut heads = Vec::new();
+        for stream in streams.into_iter().take(limit) {
+            let head = self.log.head(&stream)?;
+            let Some(seq) = Seq::new(head.seq) else { continue };
+            heads.push(HeadView { stream: stream.key, seq, digest: head.digest });
+        }
+        Ok(Heads { heads, more })
+    }
+
+    /// At least one record, if there is one; no more than fit a reply.
+    pub fn sealed(
+        &self,
+        stream: &StreamId,
+        from: Seq,
+        limit: u32,
+    ) -> Result<SealedRecords, ReadError> {
+        let limit = (limit as usize).clamp(1, RECORDS_IN_REPLY_MAX);
+        let (mut records, mut bytes) = (Vec::new(), 0);
+        for read in self.log.sealed(stream, from)? {
+            if records.len() >= limit || bytes >= RECORDS_IN_REPLY_BYTES {
+                return Ok(SealedRecords { records, more: true });
+            }
+            let record = read?;
+            bytes += record.frame.len();
+            records.push(SealedView {
+                stream: stream.key,
+                seq: record.header.seq,
+                digest: record.digest,
+                frame: Frame(record.frame),
+            });
+        }
+        Ok(SealedRecords { records, more: false })
+    }
+
+    /// As [`Reader::sealed`], opened.
+    pub fn plain(
+        &self,
+        stream: &StreamId,
+        from: Seq,
+        limit: u32,
+    ) -> Result<PlainRecords, ReadError> {
+        let limit = (limit as usize).clamp(1, RECORDS_IN_REPLY_MAX);
+        let (mut records, mut bytes) = (Vec::new(), 0);
+        let reading = match self.log.read(stream, from) {
+            Err(ReadError::Erased) => {
+                return Ok(PlainRecords { erased: true, records, more: false });
+            }
+            reading => reading?,
+        };
+        for read in reading {
+            if records.len() >= limit || bytes >= RECORDS_IN_REPLY_BYTES {
+                return Ok(PlainRecords { erased: false, records, more: true });
+            }
+            let Record { seq, at, prev, digest, event, .. } = read?;
+            let kind = format!("{:?}", event.kind());
+            let event = replay::body(&event);
+            bytes += event.to_string().len();
+            records.push(PlainView { stream: stream.key, seq, at, prev, digest, kind, event });
+        }
+        Ok(PlainRecords { erased: false, records, more: false })
+    }
+
+    fn answer(&self, tenant: &TenantId, ask: ArchiveAsk) -> Response {
+        let stream = |key| StreamId { tenant: tenant.clone(), key };
+        let answer = match ask {
+            ArchiveAsk::Heads { after, limit } => {
+                self.heads(tenant, after, limit).map(Response::Heads)
+            }
+            ArchiveAsk::Sealed { stream: key, from, limit } => {
+                self.sealed(&stream(key), from, limit).map(Response::Records)
+            }
+            ArchiveAsk::Plain { stream: key, from, limit } => {
+                self.plain(&stream(key), from, limit).map(Response::PlainRecords)
+            }
+        };
+        answer.unwrap_or_else(|error| {
+            tracing::error!(%tenant, %error, "records cannot be read");
+            let message = format!("these records cannot be read: {error}");
+            Response::error(ErrorCode::Unavailable, message)
+        })
+    }
+}
+
+/// A thread that answers questions about the log. Those of one tenant wait behind their own, not
+/// others' behind theirs.
+#[derive(Clone)]
+pub(super) struct Archive(Arc<Desk>);
+
+struct Desk {
+    waiting: Mutex<Waiting>,
+    changed: Condvar,
+}
+
+struct Waiting {
+    turns: Turns<(Submit, ArchiveAsk)>,
+    room: Room,
+    closed: bool,
+}
+
+impl Archive {
+    /// - `open`: ends when the thread has let go of the log.
+    pub fn start(reader: Reader, open: Awake) -> std::io::Result<Archive> {
+        let room = Room::new(ARCHIVE_QUEUE_MAX);
+        let waiting = Mutex::new(Waiting { turns: Turns::default(), room, closed: false });
+        let desk = Arc::new(Desk { waiting, changed: Condvar::new() });
+        let serving = desk.clone();
+        thread::Builder::new().name("archive".to_owned()).spawn(move || {
+            let _open = open;
+            let reader = reader;
+            while let Some((submit, ask)) = serving.next() {
+                let response = reader.answer(&submit.tenant, ask);
+                submit.answer.send(response);
+            }
+        })?;
+        Ok(Archive(desk))
+    }
+
+    /// - errors: the request, when its tenant has too many here already, or nobody answers.
+    pub fn ask(&self, submit: Submit) -> Result<(), Box<Submit>> {
+        let Ask::Archive(ask) = submit.ask else { return Err(Box::new(submit)) };
+        let mut waiting = self.0.waiting();
+        if waiting.closed || !waiting.room.take(&submit.tenant, 1) {
+            return Err(Box::new(submit));
+        }
+        let tenant = submit.tenant.clone();
+        waiting.turns.push(&tenant, (submit, ask));
+        self.0.changed.notify_one();
+        Ok(())
+    }
+
+    /// Answers nobody any more. What waits is told to ask again.
+    pub fn close(&self) {
+        let mut waiting = self.0.waiting();
+        waiting.closed = true;
+        let left = std::mem::take(&mut waiting.turns);
+        drop(waiting);
+        self.0.changed.notify_one();
+        drop(left);
+    }
+}
+
+impl Desk {
+    fn next(&self) -> Option<(Submit, ArchiveAsk)> {
+        let mut waiting = self.waiting();
+        loop {
+            if waiting.closed {
+                return None;
+            }
+            if let Some(job) = waiting.turns.pop() {
+                waiting.room.give_back(&job.0.tenant, 1);
+                return Some(job);
+            }
+            waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

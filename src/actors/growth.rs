@@ -1,0 +1,150 @@
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use crate::events::Durable;
+use crate::fairness::{Room, Turns};
+use crate::ids::{Seq, StreamId, TenantId};
+use crate::limits::GROWTHS_WAITING_MAX;
+
+/// What became durable, for whoever publishes it: places in the log, no content. Noting costs the
+/// writer a lock and no I/O. What finds the queue full is counted and left out; nobody waits.
+#[derive(Clone, Default)]
+pub struct Growths(Arc<Inner>);
+
+#[derive(Default)]
+struct Inner {
+    waiting: Mutex<Waiting>,
+    /// Nobody listens until this is set; nothing is kept until then.
+    wake: OnceLock<Box<dyn Fn() + Send + Sync>>,
+}
+
+struct Waiting {
+    turns: Turns<Growth>,
+    room: Room,
+    /// Records noted for each tenant, the ones left out included.
+    numbers: BTreeMap<TenantId, u64>,
+    left_out: u64,
+}
+
+/// The records `first` to `last` of a stream are durable.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Growth {
+    pub stream: StreamId,
+    pub first: Seq,
+    pub last: Seq,
+    /// The place of `first` among all records that were noted for this tenant, from 1 on: whoever
+    /// sees a number missing has missed records.
+    pub number: u64,
+}
+
+impl Default for Waiting {
+    fn default() -> Waiting {
+        let room = Room::new(GROWTHS_WAITING_MAX);
+        Waiting { turns: Turns::default(), room, numbers: BTreeMap::new(), left_out: 0 }
+    }
+}
+
+impl Growths {
+    /// From now on what grows is kept, and `wake` is called for each.
+    pub fn listen(&self, wake: impl Fn() + Send + Sync + 'static) {
+        let _ = self.0.wake.set(Box::new(wake));
+    }
+
+    /// Must be called after the records are durable, in the order of the stream.
+    pub(super) fn note(&self, stream: &StreamId, durable: &Durable) {
+        let Some(wake) = self.0.wake.get() else { return };
+        let records = durable.records();
+        let (Some(first), Some(last)) = (records.first(), records.last()) else { return };
+        let growth =
+            |number| Growth { stream: stream.clone(), first: first.seq, last: last.seq, number };
+        {
+            let waiting = &mut *self.waiting();
+            let number = waiting.numbers.entry(stream.tenant.clone()).or_default();
+            let growth = growth(*number + 1);
+            *number += records.len() as u64;
+            if waiting.room.take(&stream.tenant, 1) {
+                waiting.turns.push(&stream.tenant, growth);
+            } else {
+                waiting.left_out += records.len() as u64;
+            }
+        }
+        wake();
+    }
+
+    /// The next growth; tenants take turns.
+    pub fn next(&self) -> Option<Growth> {
+        let mut waiting = self.waiting();
+        let growth = waiting.turns.pop()?;
+        waiting.room.give_back(&growth.stream.tenant, 1);
+        Some(growth)
+    }
+
+    /// How many records were noted for each tenant; none while some of them are still to be taken.
+    pub fn all_taken(&self) -> Option<BTreeMap<TenantId, u64>> {
+        let waiting = self.waiting();
+        waiting.turns.is_empty().then(|| waiting.numbers.clone())
+    }
+
+    /// Records that found the queue full.
+    pub fn left_out(&self) -> u64 {
+        self.waiting().left_out
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.0.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Growths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Growths(..)")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::events::{Batch, Event, Head, TenantEvent, TenantOpened};
+    use crate::ids::{RequestId, Timestamp};
+    use crate::store::{self, EventLog};
+
+    fn durable(log: &dyn EventLog, stream: &StreamId, after: Head) -> Durable {
+        let events = vec![Event::Tenant(TenantEvent::Opened(TenantOpened {}))];
+        let batch = Batch { request: RequestId([1; 16]), at: Timestamp(1), events };
+        log.append(stream, after, batch).wait().unwrap()
+    }
+
+    #[test]
+    fn one_labs_flood_leaves_another_its_place_and_shows_as_missing_numbers() {
+        let store = store::open_memory();
+        let [a, b] = ["a", "b"].map(|name| TenantId::new(name).unwrap());
+        for tenant in [&a, &b] {
+            store.keys.make_tenant(tenant).unwrap();
+        }
+        let growths = Growths::default();
+        let [a, b] = [&a, &b].map(StreamId::of_tenant);
+        let once = durable(&*store.log, &a, Head::EMPTY);
+        growths.note(&a, &once);
+        assert_eq!(growths.next(), None, "nobody listens");
+        let woken = Arc::new(AtomicUsize::new(0));
+        let counter = woken.clone();
+        growths.listen(move || {
+            counter.fetch_add(1, Ordering::SeqCst);
+        });
+        let flood = 3 * GROWTHS_WAITING_MAX;
+        (0..flood).for_each(|_| growths.note(&a, &once));
+        growths.note(&b, &durable(&*store.log, &b, Head::EMPTY));
+        assert_eq!(woken.load(Ordering::SeqCst), flood + 1);
+        assert!(growths.left_out() > 0 && growths.all_taken().is_none());
+        assert_eq!(growths.next().map(|it| (it.stream, it.number)), Some((a.clone(), 1)));
+        assert_eq!(growths.next().map(|it| (it.stream, it.number)), Some((b.clone(), 1)));
+        while growths.next().is_some() {}
+        growths.note(&a, &once);
+        let last = growths.next().unwrap();
+        assert_eq!(last.number, flood as u64 + 1, "what was left out has its numbers");
+        assert_eq!(growths.all_taken().unwrap()[&a.tenant], flood as u64 + 1);
+    }
+}
