@@ -65,7 +65,8 @@ fn test() -> Result<(), String> {
     ];
     let shown = binaries.map(|(name, path)| (name, path.display().to_string()));
     let environment = shown.each_ref().map(|(name, path)| (*name, path.as_str()));
-    run_with(&environment, "cargo", &["test", "--workspace"])
+    // Everything that is wrong is said in one run, not the first of it.
+    run_with(&environment, "cargo", &["test", "--workspace", "--no-fail-fast"])
 }
 
 fn docs() -> Result<(), String> {
