@@ -15,7 +15,7 @@ pub(super) use self::cache::SledCache;
 pub(super) use self::check::{check_cache, check_log};
 pub(super) use self::read::{KEY_BYTES, chunk_key};
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -388,7 +388,30 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
         .cache_capacity(cache_bytes)
         // Background flushing would give "durable" a second meaning.
         .flush_every_ms(None);
+    remove_unfinished_snapshots(path)
+        .map_err(|error| format!("an unfinished file of it cannot be removed: {error}"))?;
     guarded(|| config.open())?.map_err(|error| sentence(&error))
+}
+
+/// Removes what a process that was killed while the database wrote one of its own snapshots left of
+/// it. `sled` 0.34.7 gives a snapshot its final name only when it is whole, and takes the former one
+/// away after that, so that an unfinished one is never needed; but at the next opening it takes it for
+/// the newest and refuses the whole database for ever.
+fn remove_unfinished_snapshots(path: &Path) -> io::Result<()> {
+    let entries = match fs::read_dir(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("snap.") && name.ends_with(".generating") {
+            tracing::info!(file = %entry.path().display(), "an unfinished snapshot is removed");
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 /// What a heads file says was acknowledged.

@@ -299,3 +299,26 @@ fn a_missing_heads_file_or_database_is_reported() {
     let Err(error) = open(dir.path()) else { panic!("a missing database went unnoticed") };
     assert!(error.to_string().contains("restore the directory from a backup"), "{error}");
 }
+
+#[test]
+fn what_a_kill_left_of_an_unfinished_snapshot_of_the_database_keeps_nothing_shut() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = open(dir.path()).unwrap();
+    let ada = ada(&made);
+    fill(&made, &ada, 3);
+    drop(made);
+    for (left, part) in [(&b""[..], "log"), (b"half of it", "log"), (b"half of it", "cache")] {
+        let killed = tempfile::tempdir().unwrap();
+        copy(dir.path(), killed.path());
+        fs::remove_file(killed.path().join(format!("CLOSED-{part}"))).unwrap();
+        let file = killed.path().join(part).join("snap.000000000000FFFF.generating");
+        fs::write(&file, left).unwrap();
+        let alone = tempfile::tempdir().unwrap();
+        copy(&killed.path().join(part), alone.path());
+        let by_itself = ::sled::Config::new().path(alone.path()).open();
+        assert!(by_itself.is_err(), "the database has learnt it: this can go");
+        let store = open(killed.path()).unwrap_or_else(|error| panic!("{part}: {error}"));
+        assert_eq!(store.log.head(&ada).unwrap().seq, 3);
+        assert!(!file.exists());
+    }
+}
