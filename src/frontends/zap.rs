@@ -301,6 +301,32 @@ mod tests {
     }
 
     #[test]
+    fn whatever_frames_come_nobody_is_let_in_and_the_doorkeeper_stays() {
+        use proptest::prelude::*;
+        let (keeper, socket, failure) = desk();
+        let part = || {
+            prop_oneof![
+                Just(b"1.0".to_vec()),
+                Just(b"apprentice".to_vec()),
+                Just(b"apprentice/plain/lab".to_vec()),
+                Just(b"CURVE".to_vec()),
+                Just(vec![7; 32]),
+                prop::collection::vec(any::<u8>(), 0..600),
+            ]
+        };
+        let question = prop::collection::vec(part(), 1..12);
+        proptest!(|(question in question)| {
+            socket.send_multipart(&question, 0).unwrap();
+            let answer = socket.recv_multipart(0).unwrap();
+            prop_assert_eq!(answer.len(), 6);
+            prop_assert!(answer[2] == b"400" || answer[2] == b"500");
+            prop_assert!(answer[4].is_empty());
+        });
+        drop(keeper);
+        assert_eq!(failure.reason(), None);
+    }
+
+    #[test]
     fn a_user_id_that_was_not_given_here_names_nobody() {
         let (seal, other) = (Seal::fresh(), Seal::fresh());
         let key = PublicKey([9; 32]);

@@ -3,20 +3,26 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use apprentice::actors::{Ask, Response};
+use apprentice::actors::{
+    ArchiveAsk, Ask, Frame, HeadView, Heads, PlainRecords, PlainView, Response, SealedRecords,
+    SealedView, TenantAsk, TenantVerb,
+};
 use apprentice::cli::TranscriptFile;
 use apprentice::events::{self, EventKind, Head, Header};
 use apprentice::evidence::{
     Checkpoint, Consistency, Inclusion, NoteSigner, Proof, Revealed, TreeHash, VerifierKey,
 };
 use apprentice::frontends::wire::{self, Request};
-use apprentice::frontends::{CurveKey, Endpoint, read_public};
-use apprentice::ids::{Digest, RequestId, Seq, StreamId, StreamKey, TenantId, UserId};
+use apprentice::frontends::{CurveKey, Endpoint, FeedMessage, read_public};
+use apprentice::ids::{
+    Digest, PublicKey, RequestId, Seq, StreamId, StreamKey, TenantId, Timestamp, UserId,
+};
 use apprentice::language::{Document, Program, Utterance};
 use apprentice::learning::{Mind, Recipe};
 use apprentice::session::{Command, OnClash, Query, State};
 use apprentice::store::{self, DataKey, FaultPlan, SeededEntropy, Store, Walk, decoders};
 use apprentice::study::corpus::Corpus;
+use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Domain, Stage};
 
@@ -103,11 +109,79 @@ pub fn requests() -> Vec<Vec<u8>> {
             Ask::Query(Query::Known),
             Ask::Wait { seconds: 1 },
             Ask::Hello,
+            Ask::Feed,
+            Ask::Archive(ArchiveAsk::Heads { after: Some(StreamKey([5; 16])), limit: 7 }),
+            Ask::Archive(ArchiveAsk::Sealed {
+                stream: StreamKey([5; 16]),
+                from: explains,
+                limit: 7,
+            }),
+            Ask::Archive(ArchiveAsk::Plain {
+                stream: StreamKey([5; 16]),
+                from: explains,
+                limit: 7,
+            }),
         ]);
     asks.map(|ask| {
         wire::encode_request(&Request { id: RequestId([7; 16]), user: user.clone(), ask })
     })
     .collect()
+}
+
+/// What only operators may ask, for the decoder alone.
+fn orders() -> Vec<Vec<u8>> {
+    let (key, new) = (PublicKey([3; 32]), PublicKey([4; 32]));
+    let quotas = Quotas { utterances_per_second: Some(3), ..Quotas::default() };
+    let orders = [
+        Order::Open,
+        Order::Admit { key, role: Role::Auditor, label: "a laptop".to_owned() },
+        Order::Retire { key, overlap_seconds: 60 },
+        Order::Rotate { old: key, new, overlap_seconds: 60 },
+        Order::Disable { reason: "over".to_owned() },
+        Order::Enable,
+        Order::SetQuotas(quotas),
+    ];
+    let user = UserId::new("ada").unwrap();
+    let erase = TenantVerb::Erase { user: user.clone() };
+    let verbs = orders.map(TenantVerb::Give).into_iter().chain([TenantVerb::List, erase]);
+    verbs
+        .map(|verb| {
+            let ask = Ask::Order(TenantAsk { tenant: Some(TenantId::new("lab-a").unwrap()), verb });
+            wire::encode_request(&Request { id: RequestId([7; 16]), user: user.clone(), ask })
+        })
+        .collect()
+}
+
+/// A record in each kind of feed, as a message of the feed and as an answer at the door.
+fn feeds() -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
+    let (stream, seq) = (StreamKey([5; 16]), Seq::new(1).unwrap());
+    let digest = Digest::of(b"a record");
+    let sealed = SealedView { stream, seq, digest, frame: Frame(vec![9; 300]) };
+    let plain = PlainView {
+        stream,
+        seq,
+        at: Timestamp(1),
+        prev: Digest::of(b"the one before"),
+        digest,
+        kind: "Interpreted".to_owned(),
+        event: serde_json::json!({"utterance": "ring the bell", "program": [1, 2, {"a": null}]}),
+    };
+    let message = |sealed, plain| {
+        let start = RequestId([8; 16]);
+        FeedMessage { v: wire::VERSION, start, number: 7, sealed, plain }.encode()
+    };
+    let messages = vec![
+        message(Some(sealed.clone()), None),
+        message(None, Some(plain.clone())),
+        message(None, None),
+    ];
+    let answers = [
+        Response::Heads(Heads { heads: vec![HeadView { stream, seq, digest }], more: true }),
+        Response::Records(SealedRecords { records: vec![sealed], more: false }),
+        Response::PlainRecords(PlainRecords { erased: false, records: vec![plain], more: false }),
+    ];
+    let answers = answers.map(|answer| wire::encode_response(RequestId([7; 16]), answer));
+    (messages, answers.to_vec())
 }
 
 /// A life in the household: an export of it, its state, its mind.
@@ -161,6 +235,7 @@ impl Past {
 pub fn all() -> Vec<Target> {
     let past = Past::live();
     let Past { folder, household, recipe, state, mind, scene, task, responses } = past;
+    let (messages, answers) = feeds();
     let data = folder.path().join("data");
     let local = TenantId::local();
     let exported = folder.path().join("local.export");
@@ -179,8 +254,13 @@ pub fn all() -> Vec<Target> {
     let scratch = Arc::new(tempfile::tempdir_in(ram()).unwrap());
 
     let mut targets = vec![
-        target("wire request", 20, requests(), |bytes| wire::decode_request(bytes).is_ok()),
-        target("wire response", 20, responses, |bytes| wire::decode_response(bytes).is_ok()),
+        target("wire request", 20, [requests(), orders()].concat(), |bytes| {
+            wire::decode_request(bytes).is_ok()
+        }),
+        target("wire response", 20, [responses, answers].concat(), |bytes| {
+            wire::decode_response(bytes).is_ok()
+        }),
+        target("feed message", 5, messages, |bytes| FeedMessage::decode(bytes).is_ok()),
         target("snapshot", 5, vec![state], |bytes| {
             decoders::snapshot::<State<Scene, Task>>(bytes).is_some()
         }),
@@ -250,7 +330,7 @@ fn records() -> Vec<Target> {
         .map(|(_, event)| {
             let batch = events::Batch {
                 request: RequestId([1; 16]),
-                at: apprentice::ids::Timestamp(1),
+                at: Timestamp(1),
                 events: vec![event],
             };
             let draft = store::Draft::encode(batch).unwrap();
