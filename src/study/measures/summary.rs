@@ -9,8 +9,11 @@ pub const ALL: &str = "all";
 /// The task type of lines over recorded people with fewer episodes than the others have.
 pub const FEW: &str = "under_5_episodes";
 
+/// A measure's name, and its value of one episode where it has one.
+pub type Measure = (&'static str, fn(&EpisodeRow) -> Option<f64>);
+
 /// What is summed up, in the order of the table.
-pub const MEASURES: [(&str, fn(&EpisodeRow) -> Option<f64>); 7] = [
+pub const MEASURES: [Measure; 7] = [
     ("complexity", |row| row.complexity),
     ("examples_taught", |row| Some(f64::from(row.examples_taught))),
     ("normalised_length", |row| row.normalised_length),

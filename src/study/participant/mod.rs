@@ -8,6 +8,8 @@ mod recorded;
 mod simulated;
 mod talk;
 mod teacher;
+#[cfg(test)]
+mod tests;
 mod wording;
 
 pub use meaning::{Aim, aim, carried_out_as_meant, run_for};

@@ -131,12 +131,11 @@ pub fn primitives(steps: &[Step], mut join: impl FnMut() -> bool) -> Vec<Unit> {
     for (index, step) in steps.iter().enumerate() {
         let mut unit = primitive(step);
         let walk = index.checked_sub(1).map(|before| &steps[before]);
-        if let Some(walk) = walk.filter(|walk| walk.operator == "GOTO" && step.operator != "GOTO") {
-            if join() {
-                units.pop();
-                unit.steps = vec![walk.clone(), step.clone()];
-                unit.parts = vec![primitive(walk), primitive(step)];
-            }
+        let before = walk.filter(|walk| walk.operator == "GOTO" && step.operator != "GOTO");
+        if let Some(walk) = before.filter(|_| join()) {
+            units.pop();
+            unit.steps = vec![walk.clone(), step.clone()];
+            unit.parts = vec![primitive(walk), primitive(step)];
         }
         units.push(unit);
     }

@@ -4,12 +4,12 @@
 use super::parts::{Unit, primitive};
 use super::talk::{Heard, Talk, TalkError, Turn};
 use super::teacher::{Size, Teacher};
-use super::wording::{Names, say_plainly};
+use super::wording::{Names, Shunned, Words, say_plainly};
 use crate::frontends::Client;
-use crate::language::{Program, Step, Utterance};
+use crate::language::{Program, Step, Symbol, Utterance};
 use crate::study::draw;
 use crate::world::household::{Household, Scene};
-use crate::world::{Domain, Stage};
+use crate::world::{Domain, Stage, Thing};
 
 /// Rounds of putting right what went wrong in one step, before the episode is given up.
 const REPAIRS_MAX: usize = 3;
@@ -44,7 +44,7 @@ pub fn speak(
 ) -> Result<Vec<Turn>, TalkError> {
     let talk = Talk::begin(client, episode.household, place, episode.stage, UTTERANCES_MAX)?;
     let names = Names::of(episode.household);
-    let mut speaker = Speaker { episode, names, talk };
+    let mut speaker = Speaker { episode, names, talk, shunned: Shunned::new() };
     for said in episode.script {
         if speaker.talk.over() || !speaker.step(said)? {
             break;
@@ -58,6 +58,8 @@ struct Speaker<'a> {
     episode: &'a Episode<'a>,
     names: Names<'a>,
     talk: Talk<'a, ()>,
+    /// Names that led elsewhere in this episode.
+    shunned: Shunned,
 }
 
 impl Speaker<'_> {
@@ -115,7 +117,14 @@ impl Speaker<'_> {
             }
             let meant = Program { steps: vec![step.clone()] };
             let words = self.words(&primitive(step), attempt);
-            heard = self.talk.say(&words, &meant, first && attempt == 0, ())?;
+            heard = self.talk.say(&words.text, &meant, first && attempt == 0, ())?;
+            if heard == Heard::Wrong {
+                // A name that led elsewhere.
+                let did = self.talk.did();
+                let named = |kind: &Symbol| did.iter().any(|step| step.args.contains(kind));
+                let wrong = words.names.into_iter().filter(|(kind, _)| !named(kind));
+                self.shunned.extend(wrong);
+            }
             if !matches!(heard, Heard::Impossible | Heard::NotSure) {
                 break;
             }
@@ -123,8 +132,8 @@ impl Speaker<'_> {
         Ok(heard)
     }
 
-    fn words(&self, unit: &Unit, attempt: usize) -> String {
-        let on = |thing: &crate::world::Thing| thing.states.iter().any(|state| state == "on");
+    fn words(&self, unit: &Unit, attempt: usize) -> Words {
+        let on = |thing: &Thing| thing.states.iter().any(|state| state == "on");
         let things = self.episode.household.look(self.talk.scene()).things;
         let is_on = things.iter().any(|thing| thing.kind == unit.thing && on(thing));
         let key = match unit.key {
@@ -142,7 +151,7 @@ impl Speaker<'_> {
                 (attempt + draw::rng(self.episode.seed, &purpose).below(2)) % wordings.len()
             }
         };
-        say_plainly(&self.names, &wordings[place], unit)
+        say_plainly(&self.names, &self.shunned, &wordings[place], unit)
     }
 
     /// Undoes, in primitives, what can be undone: what was carried off is brought back, what was
@@ -180,11 +189,11 @@ impl Speaker<'_> {
 
 /// The steps that bring things back to where they were; walks and doors are added by whoever aims.
 fn undo(household: &Household, now: &Scene, before: &Scene) -> Vec<Step> {
-    let step = |operator: &str, args: &[&crate::language::Symbol]| Step {
-        operator: crate::language::Symbol::new(operator),
+    let step = |operator: &str, args: &[&Symbol]| Step {
+        operator: Symbol::new(operator),
         args: args.iter().map(|arg| (*arg).clone()).collect(),
     };
-    let is = |thing: &crate::world::Thing, state: &str| thing.states.iter().any(|s| s == state);
+    let is = |thing: &Thing, state: &str| thing.states.iter().any(|s| s == state);
     let (now, then) = (household.look(now).things, household.look(before).things);
     let kind_of = |place: &Option<String>| {
         let place = place.as_ref()?;
@@ -193,10 +202,9 @@ fn undo(household: &Household, now: &Scene, before: &Scene) -> Vec<Step> {
     let mut steps = Vec::new();
     // The hand first: with a full one nothing else can be picked up.
     for (thing, was) in now.iter().zip(&then) {
-        if is(thing, "held") && !is(was, "held") {
-            if let Some(place) = kind_of(&was.place) {
-                steps.push(step("PUT", &[&thing.kind, place]));
-            }
+        let picked_up = is(thing, "held") && !is(was, "held");
+        if let Some(place) = kind_of(&was.place).filter(|_| picked_up) {
+            steps.push(step("PUT", &[&thing.kind, place]));
         }
     }
     for (thing, was) in now.iter().zip(&then) {

@@ -1,20 +1,20 @@
 //! The simulated teacher: asks for much where it trusts the robot, breaks into smaller requests what
 //! is not understood, puts right what went wrong, and afterwards teaches.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
 use super::parts::{Unit, parts, primitives, whole};
 use super::talk::{Heard, Talk, TalkError, Turn};
 use super::teacher::{Share, Size, Teacher};
-use super::wording::{Names, chance, say, say_plainly};
+use super::wording::{Names, Shunned, Words, chance, say, say_plainly};
 use crate::frontends::Client;
-use crate::language::Step;
+use crate::language::{Program, Step, Symbol};
 use crate::numerics::Rng;
 use crate::study::draw;
 use crate::world::household::Household;
-use crate::world::{Domain, Stage};
+use crate::world::{Domain, Stage, Thing};
 
 /// Plans made in one episode before it is given up.
 const PLANS_MAX: usize = 60;
@@ -37,9 +37,9 @@ struct Note {
 }
 
 /// How a request ended.
-enum Done {
+enum Asked {
     /// It is done, at once or in parts.
-    Done,
+    Settled,
     /// Something else was done: the rest is to be planned anew.
     Wrong,
     /// There is no way on.
@@ -88,7 +88,15 @@ pub fn teach(
     let said_max = episode.teacher.utterances_max;
     let talk = Talk::begin(client, episode.household, place, episode.stage, said_max)?;
     let names = Names::of(episode.household);
-    let mut speaker = Speaker { person, episode, names, talk, rng: rng("speaking") };
+    let mut speaker = Speaker {
+        person,
+        episode,
+        names,
+        talk,
+        rng: rng("speaking"),
+        shunned: Shunned::new(),
+        failed: BTreeSet::new(),
+    };
     speaker.pursue()?;
     let talk = speaker.talk;
     let (teacher, mut rng) = (episode.teacher, rng("teaching"));
@@ -107,6 +115,10 @@ struct Speaker<'a> {
     names: Names<'a>,
     talk: Talk<'a, Note>,
     rng: Rng,
+    /// Names that led elsewhere in this episode.
+    shunned: Shunned,
+    /// Habits with wordings that did not work in this episode.
+    failed: BTreeSet<(String, String)>,
 }
 
 impl Speaker<'_> {
@@ -130,9 +142,9 @@ impl Speaker<'_> {
             let first = !careful;
             careful = match self.request(&unit, first)? {
                 // A whole part in primitives, then the teacher is itself again.
-                Done::Done => careful && again,
-                Done::Wrong => true,
-                Done::Lost => return Ok(()),
+                Asked::Settled => careful && again,
+                Asked::Wrong => true,
+                Asked::Lost => return Ok(()),
             };
             let as_planned = expected.is_some_and(|aim| aim.after == *self.talk.scene());
             match as_planned {
@@ -180,23 +192,23 @@ impl Speaker<'_> {
     }
 
     /// Asks for something; what is not understood, in smaller requests.
-    fn request(&mut self, unit: &Unit, first: bool) -> Result<Done, TalkError> {
+    fn request(&mut self, unit: &Unit, first: bool) -> Result<Asked, TalkError> {
         let tries = match unit.parts.is_empty() {
             true => self.episode.teacher.attempts,
             false => usize::from(unit.key.is_some()),
         };
         for attempt in 0..tries {
-            let Some(aim) = self.talk.aim(&unit.steps) else { return Ok(Done::Wrong) };
+            let Some(aim) = self.talk.aim(&unit.steps) else { return Ok(Asked::Wrong) };
             if aim.program.steps.is_empty() {
-                return Ok(Done::Done);
+                return Ok(Asked::Settled);
             }
             if self.talk.over() {
-                return Ok(Done::Lost);
+                return Ok(Asked::Lost);
             }
             let last = tries > 1 && attempt + 1 == tries;
             let (words, note) = self.words(unit, attempt, last);
             let (habit, wording) = (note.habit.clone(), note.wording.clone());
-            let heard = self.talk.say(&words, &aim.program, first && attempt == 0, note)?;
+            let heard = self.talk.say(&words.text, &aim.program, first && attempt == 0, note)?;
             let teacher = self.episode.teacher;
             match heard {
                 Heard::Right => {
@@ -204,37 +216,54 @@ impl Speaker<'_> {
                         self.person.gain(teacher.trust_gain);
                     }
                     self.person.habits.insert(habit, wording);
-                    return Ok(Done::Done);
+                    return Ok(Asked::Settled);
                 }
                 Heard::Wrong => {
                     self.person.lose(teacher.trust_loss_wrong);
-                    self.person.habits.remove(&habit);
-                    return Ok(Done::Wrong);
+                    if !self.misnamed(&aim.program, &words) {
+                        self.person.habits.remove(&habit);
+                        self.failed.insert((habit, wording));
+                    }
+                    return Ok(Asked::Wrong);
                 }
                 Heard::Impossible | Heard::NotSure => {
                     self.person.lose(teacher.trust_loss_not_understood);
                     self.person.habits.remove(&habit);
+                    self.failed.insert((habit, wording));
                     // Said without the walk: the robot does not come by itself.
                     if unit.size == Size::Primitive && unit.steps.len() > 1 {
                         self.person.walks |= heard == Heard::Impossible;
                     }
                 }
-                Heard::Refused => return Ok(Done::Lost),
+                Heard::Refused => return Ok(Asked::Lost),
             }
         }
         if unit.parts.is_empty() {
-            return Ok(Done::Lost);
+            return Ok(Asked::Lost);
         }
         for part in &unit.parts {
             match self.request(part, false)? {
-                Done::Done => {}
+                Asked::Settled => {}
                 other => return Ok(other),
             }
         }
-        Ok(Done::Done)
+        Ok(Asked::Settled)
     }
 
-    fn words(&mut self, unit: &Unit, attempt: usize, last: bool) -> (String, Note) {
+    /// Whether something else was meant by a name than the teacher means; it then looks for another
+    /// name.
+    fn misnamed(&mut self, meant: &Program, words: &Words) -> bool {
+        let names = |steps: &[Step], kind: &Symbol| steps.iter().any(|s| s.args.contains(kind));
+        let did = self.talk.did();
+        let wrong = words.names.iter().filter(|(kind, _)| {
+            names(&meant.steps, kind) && !names(did, kind) && did.len() >= meant.steps.len()
+        });
+        let before = self.shunned.len();
+        self.shunned.extend(wrong.cloned());
+        self.shunned.len() > before
+    }
+
+    fn words(&mut self, unit: &Unit, attempt: usize, last: bool) -> (Words, Note) {
         let key = match unit.key {
             Some("on") => self.switch(unit),
             Some(key) => key,
@@ -255,9 +284,16 @@ impl Speaker<'_> {
             (0, None) if !any => wordings[favourite].clone(),
             _ => wordings[drawn].clone(),
         };
+        // What did not work a moment ago is not tried again while there is anything else to say.
+        let works = |wording: &&String| !self.failed.contains(&(habit.clone(), (*wording).clone()));
+        let others = || wordings.iter().cycle().skip(drawn).take(wordings.len()).find(works);
+        let wording = match last || works(&&wording) {
+            true => wording,
+            false => others().cloned().unwrap_or(wording),
+        };
         let words = match last {
-            true => say_plainly(&self.names, &wording, unit),
-            false => say(&self.names, teacher, &wording, unit, &mut self.rng),
+            true => say_plainly(&self.names, &self.shunned, &wording, unit),
+            false => say(&self.names, &self.shunned, teacher, &wording, unit, &mut self.rng),
         };
         (words, Note { habit, wording })
     }
@@ -265,7 +301,7 @@ impl Speaker<'_> {
     /// Whether what is to be switched is off now.
     fn switch(&self, unit: &Unit) -> &'static str {
         let view = self.episode.household.look(self.talk.scene());
-        let on = |thing: &crate::world::Thing| thing.states.iter().any(|state| state == "on");
+        let on = |thing: &Thing| thing.states.iter().any(|state| state == "on");
         let is_on = view.things.iter().any(|thing| thing.kind == unit.thing && on(thing));
         if is_on { "off" } else { "on" }
     }

@@ -73,11 +73,12 @@ pub struct Talk<'a, T> {
     task: Task,
     scene: Scene,
     actions: Vec<Step>,
+    /// Where the actions of the last thing said begin.
+    last_from: usize,
     turns: Vec<Turn>,
     open: Vec<Open<T>>,
     /// What may be taught, once the episode has ended.
     ended: Option<Vec<Seq>>,
-    achieved: bool,
     said_max: usize,
 }
 
@@ -102,10 +103,10 @@ impl<'a, T> Talk<'a, T> {
             task,
             scene,
             actions: Vec::new(),
+            last_from: 0,
             turns: Vec::new(),
             open: Vec::new(),
             ended: None,
-            achieved: false,
             said_max,
         };
         // A study that was killed while this person's mind was trained comes back in the middle.
@@ -124,6 +125,11 @@ impl<'a, T> Talk<'a, T> {
 
     pub fn task(&self) -> &Task {
         &self.task
+    }
+
+    /// What the robot did upon the last thing said.
+    pub fn did(&self) -> &[Step] {
+        &self.actions[self.last_from..]
     }
 
     pub fn said(&self) -> usize {
@@ -167,6 +173,7 @@ impl<'a, T> Talk<'a, T> {
                         )));
                     }
                     let before = self.scene.clone();
+                    self.last_from = self.actions.len();
                     heard = match &answer.outcome {
                         Outcome::Understood { program, .. } => {
                             self.watch(program)?;
@@ -192,7 +199,6 @@ impl<'a, T> Talk<'a, T> {
                 }
                 Told::EpisodeEnded { to_teach, .. } => {
                     self.ended = Some(to_teach);
-                    self.achieved = true;
                 }
                 other => return Err(TalkError::Puzzling(format!("{other:?} after an utterance"))),
             }

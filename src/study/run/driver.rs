@@ -56,7 +56,7 @@ pub enum RunError {
     #[error("{} holds another study: {difference}; name a new directory or run it with its own settings", path.display())]
     Different { path: PathBuf, difference: String },
     #[error("the service of condition {condition} did not start: {error}; {state}")]
-    Start { condition: String, error: StartError, state: State },
+    Start { condition: String, error: Box<StartError>, state: State },
     #[error("{what} in condition {condition}: {reason}; {state}")]
     Stopped { condition: String, what: String, reason: String, state: State },
 }
@@ -147,7 +147,7 @@ impl Run<'_> {
         }
         let service = self.start(condition).map_err(|error| RunError::Start {
             condition: condition.name.clone(),
-            error,
+            error: Box::new(error),
             state: self.state(done),
         })?;
         let endpoint =

@@ -50,8 +50,8 @@ pub fn scene_file(scene: &Scene, dirty: Option<Kind>) -> Result<String, String> 
     let mut order: Vec<usize> = Vec::new();
     while order.len() < parents.len() {
         let before = order.len();
-        for index in 0..parents.len() {
-            let ready = parents[index].is_none_or(|parent| order.contains(&parent));
+        for (index, parent) in parents.iter().enumerate() {
+            let ready = parent.is_none_or(|parent| order.contains(&parent));
             if ready && !order.contains(&index) {
                 order.push(index);
             }
