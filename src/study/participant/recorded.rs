@@ -88,7 +88,7 @@ impl Speaker<'_> {
             let start = self.talk.scene().clone();
             let mut wrong = false;
             for step in &aim.program.steps {
-                match self.primitive(step, said.sentence.is_none())? {
+                match self.primitive(step)? {
                     Heard::Right => {}
                     Heard::Wrong => {
                         wrong = true;
@@ -108,7 +108,7 @@ impl Speaker<'_> {
     }
 
     /// Asks for one primitive, in other words until it is understood.
-    fn primitive(&mut self, step: &Step, first: bool) -> Result<Heard, TalkError> {
+    fn primitive(&mut self, step: &Step) -> Result<Heard, TalkError> {
         let attempts = self.episode.teacher.attempts;
         let mut heard = Heard::Refused;
         for attempt in 0..attempts {
@@ -117,7 +117,7 @@ impl Speaker<'_> {
             }
             let meant = Program { steps: vec![step.clone()] };
             let words = self.words(&primitive(step), attempt);
-            heard = self.talk.say(&words.text, &meant, first && attempt == 0, ())?;
+            heard = self.talk.say(&words.text, &meant, false, ())?;
             if heard == Heard::Wrong {
                 // A name that led elsewhere.
                 let did = self.talk.did();
@@ -170,7 +170,7 @@ impl Speaker<'_> {
                 if self.talk.over() {
                     return Ok(false);
                 }
-                match self.primitive(step, false)? {
+                match self.primitive(step)? {
                     Heard::Right => {}
                     Heard::Wrong => {
                         wrong = true;

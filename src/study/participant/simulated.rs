@@ -32,6 +32,7 @@ pub struct Person {
 
 /// What is remembered with something said: the habit that teaching it makes.
 struct Note {
+    size: Size,
     habit: String,
     wording: String,
 }
@@ -100,8 +101,12 @@ pub fn teach(
     speaker.pursue()?;
     let talk = speaker.talk;
     let (teacher, mut rng) = (episode.teacher, rng("teaching"));
-    let (taught, turns) = talk.end(|_: &Note| {
-        !chance(&mut rng, teacher.forgetfulness) && chance(&mut rng, teacher.effort)
+    let (taught, turns) = talk.end(|note: &Note| {
+        let effort = match note.size {
+            Size::Primitive => teacher.effort_primitives,
+            Size::Part | Size::Whole => teacher.effort,
+        };
+        !chance(&mut rng, teacher.forgetfulness) && chance(&mut rng, effort)
     })?;
     for note in taught {
         person.habits.insert(note.habit, note.wording);
@@ -295,7 +300,7 @@ impl Speaker<'_> {
             true => say_plainly(&self.names, &self.shunned, &wording, unit),
             false => say(&self.names, &self.shunned, teacher, &wording, unit, &mut self.rng),
         };
-        (words, Note { habit, wording })
+        (words, Note { size: unit.size, habit, wording })
     }
 
     /// Whether what is to be switched is off now.

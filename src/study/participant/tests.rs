@@ -80,6 +80,7 @@ fn a_teacher_without_ambition_speaks_in_primitives_and_one_without_effort_teache
         ("part = 0.55", "part = 0.0"),
         ("walks_left_out = 0.5", "walks_left_out = 0.0"),
         ("effort = 0.9", "effort = 0.0"),
+        ("effort_primitives = 0.5", "effort_primitives = 0.0"),
     ]);
     let client = client(&service, "ben");
     let (turns, _) = live(&client, &household, &teacher);

@@ -66,13 +66,19 @@ impl<'a> Names<'a> {
 
     fn plural(&self, name: &str) -> String {
         let (before, last) = name.rsplit_once(' ').map_or(("", name), |(b, last)| (b, last));
-        let irregular = self.lexicon.plurals.iter().find(|(_, singular)| *singular == last);
+        // The lexicon also has plurals that people write though they are none: "knifes".
+        let regular = format!("{last}s");
+        let irregular = self
+            .lexicon
+            .plurals
+            .iter()
+            .find(|(plural, singular)| *singular == last && **plural != regular);
         let plural = match irregular {
             Some((plural, _)) => plural.clone(),
             None if ["s", "x", "ch", "sh"].iter().any(|end| last.ends_with(end)) => {
                 format!("{last}es")
             }
-            None => format!("{last}s"),
+            None => regular,
         };
         format!("{before} {plural}").trim().to_owned()
     }
