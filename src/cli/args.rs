@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::logging::Logging;
 use super::{
     audit, check_copy, checkpoint, converse, erase, eval, export, follow, import, keys, log, proof,
-    replay, salvage, self_test, serve, talk, tenant, transcript, verify,
+    replay, salvage, self_test, serve, study, talk, tenant, transcript, verify,
 };
 use crate::store;
 
@@ -57,6 +57,7 @@ enum Verb {
     Tenant(tenant::Arguments),
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
+    Study(study::Arguments),
     Log(log::Arguments),
     Replay(replay::Arguments),
     Audit(audit::Arguments),
@@ -103,6 +104,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Tenant(arguments)) => tenant::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
+        Some(Verb::Study(arguments)) => study::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
         Some(Verb::Replay(arguments)) => replay::run(arguments),
         Some(Verb::Audit(arguments)) => audit::run(arguments),

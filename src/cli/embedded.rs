@@ -45,14 +45,22 @@ pub fn start(wanted: Wanted) -> Result<Service, Failure> {
     config.listen_curve = wanted.listen_curve;
     config.feed = wanted.feed;
     config.server_key = wanted.server_key;
-    Service::start(config).map_err(|error| match error {
+    Service::start(config).map_err(|error| match is_bad_input(&error) {
+        true => Failure::bad_input(error),
+        false => Failure::failed(error),
+    })
+}
+
+/// Whether a service did not start because of what the person named.
+pub fn is_bad_input(error: &StartError) -> bool {
+    match error {
         StartError::Endpoint(_)
         | StartError::FeedAlone
         | StartError::ServerKey(_)
         | StartError::Store(_)
-        | StartError::Gateway(_) => Failure::bad_input(error),
-        StartError::Actors(_) | StartError::Drill(_) => Failure::failed(error),
-    })
+        | StartError::Gateway(_) => true,
+        StartError::Actors(_) | StartError::Drill(_) => false,
+    }
 }
 
 /// The name of a person as it was typed.

@@ -179,7 +179,10 @@ fn printed<R: Serialize + std::fmt::Display>(
     object.expect("reports have text keys and finite numbers") + "\n"
 }
 
-fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
+/// Shows the first bad lines of a corpus on standard error.
+///
+/// - errors: with `strict` the first one.
+pub fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
     if let Some(BadLine { line, reason }) = bad.first().filter(|_| strict) {
         return Err(Failure::bad_input(format!("line {line} of the corpus is bad: {reason}")));
     }

@@ -1,6 +1,7 @@
 //! Reading recorded sentences: one JSON object a line, plain or gzipped. Lines that are no rows are
 //! counted and shown, never guessed at.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -8,8 +9,9 @@ use std::path::{Path, PathBuf};
 use flate2::read::MultiGzDecoder;
 use serde::Deserialize;
 
-use crate::language::{Program, Utterance};
-use crate::world::household::Room;
+use crate::ids::UserId;
+use crate::language::{Program, Step, Utterance};
+use crate::world::household::{Kind, Room};
 
 /// One recorded sentence with what it was recorded for. Only the sentence ever reaches a parser.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +43,8 @@ pub struct Corpus {
     pub suspect: usize,
     /// Rows set aside because primitives cannot express them.
     pub inexpressible: usize,
+    /// Whole tasks (`trial/annotation`) that lack a step which was set aside or is a bad line.
+    pub incomplete: BTreeSet<String>,
     pub bad: Vec<BadLine>,
 }
 
@@ -112,15 +116,31 @@ impl Corpus {
             if line.iter().all(u8::is_ascii_whitespace) {
                 continue;
             }
-            let read = serde_json::from_slice::<Line>(&line).map_err(|error| error.to_string());
-            if let Err(reason) = read.and_then(|line| corpus.take(line)) {
+            let taken = match serde_json::from_slice::<Line>(&line) {
+                Ok(line) => {
+                    let task = line.id.rsplit_once('/').map(|(task, _)| task.to_owned());
+                    let whole_task = line.u.is_none();
+                    let taken = corpus.take(line);
+                    if taken != Ok(true) && !whole_task {
+                        corpus.incomplete.extend(task);
+                    }
+                    taken
+                }
+                Err(error) => Err(error.to_string()),
+            };
+            if let Err(reason) = taken {
                 corpus.bad.push(BadLine { line: index + 1, reason });
             }
         }
         Ok(corpus)
     }
 
-    fn take(&mut self, line: Line) -> Result<(), String> {
+    /// - returns: whether the row can be used.
+    fn take(&mut self, line: Line) -> Result<bool, String> {
+        if line.user.trim().is_empty() {
+            return Err("its user is empty".to_owned());
+        }
+        UserId::new(&line.user).map_err(|error| error.to_string())?;
         let room = room(line.scene).ok_or_else(|| {
             format!(
                 "scene {} is in no room; kitchens are 1–30, living rooms 201–230, bedrooms \
@@ -137,18 +157,19 @@ impl Corpus {
         };
         if line.suspect {
             self.suspect += 1;
-            return Ok(());
+            return Ok(false);
         }
         let Some(prims) = line.prims.filter(|_| line.expressible) else {
             self.inexpressible += 1;
-            return Ok(());
+            return Ok(false);
         };
         let program: Program =
             prims.join("; ").parse().map_err(|error| format!("{error} in {prims:?}"))?;
+        program.steps.iter().try_for_each(check_step)?;
         let sentence = Utterance::new(&text).map_err(|error| format!("{text:?}: {error}"))?;
         let (id, user, egocentric) = (line.id, line.user, line.ego);
         rows.push(Row { id, sentence, label, program, room, user, egocentric, on: false });
-        Ok(())
+        Ok(true)
     }
 }
 
@@ -166,6 +187,24 @@ impl Row {
             egocentric: false,
             on: false,
         }
+    }
+}
+
+/// - errors: an action that is no primitive, a wrong number of things, or an unknown kind of thing.
+fn check_step(step: &Step) -> Result<(), String> {
+    let known = [("GOTO", 1), ("PICKUP", 1), ("PUT", 2), ("OPEN", 1), ("CLOSE", 1), ("TOGGLE", 1)];
+    let operator = known.iter().find(|(name, _)| step.operator == **name);
+    let Some((name, takes)) = operator else {
+        let names = known.map(|(name, _)| name).join(", ");
+        return Err(format!("{} is no action; actions are {names}", step.operator));
+    };
+    if step.args.len() != *takes {
+        let found = step.args.len();
+        return Err(format!("{name} takes {takes} things, \"{step}\" has {found}"));
+    }
+    match step.args.iter().find(|kind| Kind::named(kind.as_str()).is_none()) {
+        Some(kind) => Err(format!("there is no type of thing called {kind} in \"{step}\"")),
+        None => Ok(()),
     }
 }
 

@@ -1,4 +1,4 @@
-use super::facts::Kind;
+use super::facts::{Kind, Room, facts};
 use super::features::{FEATURE_COUNT, features};
 use super::primitives::{Action, act};
 use super::scene::Scene;
@@ -29,6 +29,16 @@ impl Household {
         operators.push(operator("PUT", 2));
         let signature = Signature { operators };
         Household { signature, lexicon: words::lexicon(), seeds: words::seeds() }
+    }
+
+    /// The recorded combinations of things for one form of task, in the words of [`Task::read`],
+    /// each once; none for a form that is not recorded.
+    pub fn recorded_tasks(&self, form: &str) -> Vec<&'static str> {
+        let rooms = Room::ALL.iter().map(|room| facts().room(*room).tasks.get(form));
+        let mut tasks: Vec<&str> = rooms.flatten().flatten().map(String::as_str).collect();
+        tasks.sort_unstable();
+        tasks.dedup();
+        tasks
     }
 }
 

@@ -32,8 +32,7 @@ pub(super) fn draw_any(seed: u64) -> Result<(Scene, Task), StageError> {
 /// A form first, then one of the recorded combinations, so that the seven forms are about equally
 /// frequent, as in the recordings.
 fn draw_task(random: &mut Random) -> Task {
-    const FORMS: [&str; 7] = ["look", "place", "nested", "two", "clean", "heat", "cool"];
-    let form = FORMS[random.below(FORMS.len())];
+    let form = Task::KINDS[random.below(Task::KINDS.len())];
     let all: Vec<&str> = Room::ALL
         .iter()
         .flat_map(|room| facts().room(*room).tasks.get(form).into_iter().flatten())

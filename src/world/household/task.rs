@@ -59,6 +59,10 @@ impl Task {
         nested THING CARRIER PLACE, clean THING PLACE, heat THING PLACE, cool THING PLACE, \
         look THING LAMP, free [ROOM]; all but free may end in: closed";
 
+    /// The forms of tasks that have a goal: ALFRED's seven.
+    pub const KINDS: [&'static str; 7] =
+        ["look", "place", "nested", "two", "clean", "heat", "cool"];
+
     /// A task without a goal.
     pub fn free() -> Task {
         Task { goal: Goal::Free(None), closed: false }

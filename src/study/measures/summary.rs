@@ -1,0 +1,121 @@
+//! Means and spreads over people.
+
+use std::collections::BTreeMap;
+
+use super::rows::{EpisodeRow, UtteranceRow};
+
+/// The task type of lines over all types.
+pub const ALL: &str = "all";
+/// The task type of lines over recorded people with fewer episodes than the others have.
+pub const FEW: &str = "under_5_episodes";
+
+/// A measure's name, and its value of one episode where it has one.
+pub type Measure = (&'static str, fn(&EpisodeRow) -> Option<f64>);
+
+/// What is summed up, in the order of the table.
+pub const MEASURES: [Measure; 7] = [
+    ("complexity", |row| row.complexity),
+    ("examples_taught", |row| Some(f64::from(row.examples_taught))),
+    ("normalised_length", |row| row.normalised_length),
+    ("not_sure_rate", |row| ratio(row.not_sure, row.utterances)),
+    ("reuse_rate", |row| ratio(row.reuses.1, row.reuses.0)),
+    ("understood_first_try", |row| ratio(row.first_tries.1, row.first_tries.0)),
+    ("wrong_rate", |row| ratio(row.wrong, row.utterances)),
+];
+
+fn ratio(part: u32, whole: u32) -> Option<f64> {
+    (whole > 0).then(|| f64::from(part) / f64::from(whole))
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct SummaryRow {
+    pub condition: String,
+    pub task_type: String,
+    pub episode: u32,
+    pub measure: &'static str,
+    pub users: usize,
+    pub mean: f64,
+    /// Divided by n - 1; none for one person.
+    pub sd: Option<f64>,
+}
+
+/// The summary of sorted episodes.
+///
+/// - `few`: whether a person's episodes are reported apart.
+pub fn summary(episodes: &[EpisodeRow], few: impl Fn(&EpisodeRow) -> bool) -> Vec<SummaryRow> {
+    let mut groups: BTreeMap<(&str, &str, u32, &'static str), Vec<f64>> = BTreeMap::new();
+    for row in episodes {
+        let types = match few(row) {
+            true => vec![FEW],
+            false => vec![ALL, &row.task_type],
+        };
+        for task_type in types {
+            for (measure, value) in MEASURES {
+                let Some(value) = value(row) else { continue };
+                let key = (row.condition.as_str(), task_type, row.episode, measure);
+                groups.entry(key).or_default().push(value);
+            }
+        }
+    }
+    let row = |((condition, task_type, episode, measure), values): (_, Vec<f64>)| {
+        let (condition, task_type): (&str, &str) = (condition, task_type);
+        let (mean, sd) = spread(&values);
+        SummaryRow {
+            condition: condition.to_owned(),
+            task_type: task_type.to_owned(),
+            episode,
+            measure,
+            users: values.len(),
+            mean,
+            sd,
+        }
+    };
+    groups.into_iter().map(row).collect()
+}
+
+/// Mean and sample standard deviation of at least one value.
+fn spread(values: &[f64]) -> (f64, Option<f64>) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    (mean, (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt()))
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnsweredRow {
+    pub condition: String,
+    pub answered_by: String,
+    pub parses: usize,
+    /// Of the condition's parses.
+    pub share: f64,
+}
+
+/// Who gave how many of the programs, carried out or impossible.
+pub fn answered(utterances: &[UtteranceRow]) -> Vec<AnsweredRow> {
+    let mut counts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    let mut all: BTreeMap<&str, usize> = BTreeMap::new();
+    for row in utterances.iter().filter(|row| !row.answered_by.is_empty()) {
+        *counts.entry((&row.condition, &row.answered_by)).or_default() += 1;
+        *all.entry(&row.condition).or_default() += 1;
+    }
+    let row = |((condition, answered_by), parses): ((&str, &str), usize)| AnsweredRow {
+        condition: condition.to_owned(),
+        answered_by: answered_by.to_owned(),
+        parses,
+        share: parses as f64 / all[condition] as f64,
+    };
+    counts.into_iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_is_that_of_a_sample_and_none_of_one_value() {
+        assert_eq!(spread(&[2.0]), (2.0, None));
+        let (mean, sd) = spread(&[1.0, 2.0, 3.0, 6.0]);
+        assert_eq!(mean, 3.0);
+        assert!((sd.unwrap() - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
+    }
+}
