@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::logging::Logging;
 use super::{
     audit, check_copy, checkpoint, converse, erase, eval, export, import, keys, log, proof, replay,
-    salvage, self_test, serve, talk, tenant, transcript, verify,
+    salvage, self_test, serve, study, talk, tenant, transcript, verify,
 };
 use crate::store;
 
@@ -23,6 +23,7 @@ Examples:
   apprentice log show --data demo --user you
   apprentice replay --data demo --user you --at 17
   apprentice audit --data demo --repropose --retrain
+  apprentice study rerun --data demo --with tau=0.1..0.6/0.1
   apprentice salvage --data demo --out rescued
   apprentice checkpoint --data lab --out lab.checkpoint
   apprentice proof --data lab --user ada --seq 17 --out ada-17.proof
@@ -57,6 +58,7 @@ enum Verb {
     Tenant(tenant::Arguments),
     Transcript(transcript::Arguments),
     Eval(eval::Arguments),
+    Study(study::Arguments),
     Log(log::Arguments),
     Replay(replay::Arguments),
     Audit(audit::Arguments),
@@ -102,6 +104,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
         Some(Verb::Tenant(arguments)) => tenant::run(arguments),
         Some(Verb::Transcript(arguments)) => transcript::run(arguments),
         Some(Verb::Eval(arguments)) => eval::run(arguments),
+        Some(Verb::Study(arguments)) => study::run(arguments),
         Some(Verb::Log(arguments)) => log::run(arguments),
         Some(Verb::Replay(arguments)) => replay::run(arguments),
         Some(Verb::Audit(arguments)) => audit::run(arguments),

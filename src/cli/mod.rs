@@ -26,6 +26,7 @@ mod replay;
 mod salvage;
 mod self_test;
 mod serve;
+mod study;
 mod talk;
 mod tenant;
 mod terminal;

@@ -20,6 +20,7 @@ pub mod primitives;
 pub mod promise;
 mod renaming;
 pub mod report;
+pub mod rerun;
 pub mod scenes;
 pub mod score;
 mod seeds;
