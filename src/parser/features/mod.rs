@@ -229,12 +229,7 @@ impl FeaturesParser {
     }
 
     /// The readings of one clause as a primitive, likeliest first.
-    fn primitive_offers(
-        &self,
-        clause: &Clause,
-        judged: &[Judged],
-        threshold: f32,
-    ) -> Vec<Scored> {
+    fn primitive_offers(&self, clause: &Clause, judged: &[Judged], threshold: f32) -> Vec<Scored> {
         let Some(top) = judged.first() else { return Vec::new() };
         let operator = &self.primitives.operators[top.operator].name;
         let nothing_named = clause.lifted.slots() == 0;

@@ -27,19 +27,20 @@ pub struct MindCounts {
     pub trained: u64,
     /// Trainings under another recipe that failed; the mind before then stays, as it would have.
     pub trainings_failed: u64,
-    /// Recorded minds whose bytes the directory still had.
-    pub recorded_kept: u64,
-    /// Recorded minds that the directory had no longer: made again from the log, and held against
-    /// the digest that the log names.
+    /// Recorded minds that answered with another threshold.
+    pub recorded: u64,
+    /// Those of them whose bytes the directory had no longer: made again from the log, and held
+    /// against the digest that the log names. Not told to programs: it is a matter of caches.
+    #[serde(skip)]
     pub recorded_rebuilt: u64,
 }
 
 impl MindCounts {
     pub fn add(&mut self, other: &MindCounts) {
-        let MindCounts { trained, trainings_failed, recorded_kept, recorded_rebuilt } = other;
+        let MindCounts { trained, trainings_failed, recorded, recorded_rebuilt } = other;
         self.trained += trained;
         self.trainings_failed += trainings_failed;
-        self.recorded_kept += recorded_kept;
+        self.recorded += recorded;
         self.recorded_rebuilt += recorded_rebuilt;
     }
 }
@@ -94,10 +95,8 @@ impl RecordedMinds {
             false => {
                 let before = self.minds.work().trainings;
                 let mind = find(&self.minds)?;
-                match self.minds.work().trainings == before {
-                    true => counts.recorded_kept += 1,
-                    false => counts.recorded_rebuilt += 1,
-                }
+                counts.recorded += 1;
+                counts.recorded_rebuilt += self.minds.work().trainings - before;
                 mind
             }
         };

@@ -26,12 +26,13 @@ impl Display for Report {
                 failed => writeln!(f, "; {failed} trainings failed, and the mind before stayed")?,
             }
         }
-        if minds.recorded_kept + minds.recorded_rebuilt > 0 {
+        if minds.recorded > 0 {
+            let (all, again) = (minds.recorded, minds.recorded_rebuilt);
+            let minds = count(all as usize, "mind", "minds");
             writeln!(
                 f,
-                "recorded minds of lessons: {} still kept, {} made again from the log, digest for \
-                 digest",
-                minds.recorded_kept, minds.recorded_rebuilt
+                "recorded: {minds} of lessons, {again} of them made again from the log, digest for \
+                 digest"
             )?;
         }
         for LeftOut { tenant, user, why, is_fault } in &self.left_out {
@@ -149,32 +150,32 @@ fn sweep(f: &mut fmt::Formatter<'_>, variants: &[VariantReport]) -> fmt::Result 
     let width = variants.iter().map(|variant| variant.name.chars().count()).max().unwrap_or(0);
     let width = width.max("recorded".len()) + 2;
     for (title, of) in scopes {
-        writeln!(f, "\n{title}:")?;
+        writeln!(f, "\n{title}")?;
         writeln!(
             f,
-            "{:<width$}{:>7}{:>7}{:>12}{:>10}{:>9}{:>9}{:>12}{:>12}{:>11}",
+            "{:<width$}{:>7}{:>7} │{:^39}│{:>12}{:>12}{:>13}",
+            "", "", "same", "became", "understood,", "primitives", "loop ends,"
+        )?;
+        writeln!(
+            f,
+            "{:<width$}{:>7}{:>7} │{:>11}{:>10}{:>9}{:>9}│{:>12}{:>12}{:>13}",
             "",
             "turns",
-            "same",
+            "answer",
             "understood",
             "not sure",
             "imposs.",
             "another",
-            "understood",
-            "complexity",
-            "loop ends"
-        )?;
-        writeln!(
-            f,
-            "{:<width$}{:>14}{:>12}{:>10}{:>9}{:>9}{:>12}{:>12}{:>11}",
-            "", "became:", "", "", "", "program", "%", "", "episodes"
+            "%",
+            "per turn",
+            "episodes"
         )?;
         for variant in variants {
             let figures = of(variant);
             let share = |n: usize| 100.0 * n as f64 / figures.turns.max(1) as f64;
             writeln!(
                 f,
-                "{:<width$}{:>7}{:>7}{:>12}{:>10}{:>9}{:>9}{:>12.1}{:>12.2}{:>11}",
+                "{:<width$}{:>7}{:>7} │{:>11}{:>10}{:>9}{:>9}│{:>12.1}{:>12.2}{:>13}",
                 variant.name,
                 figures.turns,
                 figures.same,
