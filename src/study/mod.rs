@@ -16,6 +16,7 @@ pub mod lessons;
 pub mod one_shot;
 pub mod parallel;
 pub mod people;
+pub mod pictures;
 pub mod primitives;
 pub mod promise;
 mod renaming;

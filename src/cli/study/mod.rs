@@ -1,5 +1,6 @@
 //! `apprentice study`: the paper's experiments, and questions about what was recorded.
 
+mod report;
 mod rerun;
 
 use clap::{Args, Subcommand};
@@ -15,11 +16,13 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
+    Report(report::Arguments),
     Rerun(rerun::Arguments),
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     match arguments.verb {
+        Verb::Report(arguments) => report::run(arguments),
         Verb::Rerun(arguments) => rerun::run(arguments),
     }
 }
