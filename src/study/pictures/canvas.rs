@@ -147,20 +147,24 @@ impl Canvas<'_> {
         self.area.draw(&element).map_err(|error| error.to_string())
     }
 
-    /// A mean's spread, with caps where an end is that of the spread and not of the axis.
+    /// A mean's spread.
+    ///
+    /// - `whole`: whether the low and the high end are those of the spread, which get a cap, and not
+    ///   of the axis.
     pub fn spread(
         &self,
         x: i32,
         (low, high): (i32, i32),
-        low_is_cut: bool,
+        whole: (bool, bool),
         colour: RGBColor,
     ) -> Result<(), String> {
         self.line(&[(x, low), (x, high)], colour, BAR_WIDTH)?;
-        self.line(&[(x - 9, high), (x + 9, high)], colour, BAR_WIDTH)?;
-        match low_is_cut {
-            true => Ok(()),
-            false => self.line(&[(x - 9, low), (x + 9, low)], colour, BAR_WIDTH),
+        for (y, is_end) in [(high, whole.1), (low, whole.0)] {
+            if is_end {
+                self.line(&[(x - 9, y), (x + 9, y)], colour, BAR_WIDTH)?;
+            }
         }
+        Ok(())
     }
 }
 

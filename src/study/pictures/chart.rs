@@ -53,8 +53,7 @@ impl Chart<'_> {
     pub fn draw(&self, canvas: &Canvas<'_>, frame: Frame) -> Result<(), String> {
         let Frame { left, top, width, height } = frame;
         if !self.title.is_empty() {
-            canvas.text(self.title, (left, top - 70), Side::Start, TITLE)?;
-            canvas.text(self.unit, (left, top - 32), Side::Start, UNIT)?;
+            self.draw_names(canvas, frame)?;
         }
         for tick in &self.scale.ticks {
             let y = self.y(frame, *tick);
@@ -82,15 +81,23 @@ impl Chart<'_> {
         Ok(())
     }
 
+    /// The measure and its unit, above the frame.
+    pub fn draw_names(&self, canvas: &Canvas<'_>, frame: Frame) -> Result<(), String> {
+        let Frame { left, top, .. } = frame;
+        canvas.text(self.title, (left, top - 70), Side::Start, TITLE)?;
+        canvas.text(self.unit, (left, top - 32), Side::Start, UNIT)
+    }
+
     fn draw_spread(&self, canvas: &Canvas<'_>, frame: Frame, curve: &Curve) -> Result<(), String> {
         let colour = look(curve.look).colour;
-        // Nothing that is measured can be negative: what hangs below the axis is cut.
+        // Nothing that is measured can be negative, and no share above 1: what would stand outside
+        // the axis is cut.
         let ends = |point: &Point| {
             let sd = point.sd?;
-            let low = point.mean - sd;
-            let cut = low < self.scale.from;
-            let low = low.max(self.scale.from);
-            Some((self.y(frame, low), self.y(frame, point.mean + sd), cut))
+            let Scale { from, to, .. } = *self.scale;
+            let (low, high) = (point.mean - sd, point.mean + sd);
+            let whole = (low >= from, high <= to + 1e-9);
+            Some((self.y(frame, low.max(from)), self.y(frame, high.min(to)), whole))
         };
         if self.last_episode > BARS_MAX {
             let spread = curve.points.iter().filter_map(|point| Some((point, ends(point)?)));
@@ -102,8 +109,8 @@ impl Chart<'_> {
             return if outline.len() > 2 { canvas.band(&outline, colour) } else { Ok(()) };
         }
         for point in &curve.points {
-            if let Some((low, high, cut)) = ends(point) {
-                canvas.spread(self.dodged(frame, curve, point), (low, high), cut, colour)?;
+            if let Some((low, high, whole)) = ends(point) {
+                canvas.spread(self.dodged(frame, curve, point), (low, high), whole, colour)?;
             }
         }
         Ok(())

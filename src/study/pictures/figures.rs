@@ -36,7 +36,7 @@ pub(super) const MEASURES: [Measure; 3] = [
     },
     Measure {
         key: "complexity",
-        title: "Program complexity",
+        title: "Program complexity per turn",
         unit: "primitives per utterance",
         from_zero: true,
     },
@@ -106,7 +106,8 @@ pub(super) fn by_task_type(tables: &Tables, about: &About) -> Result<Option<Pict
         return Ok(None);
     }
     let (last, title) = (last_episode(tables, &names), "Three measures by task type");
-    let (row, above) = (360, 330);
+    // Below the names of the measures each row begins with its own name.
+    let (row, above) = (360, 400);
     let height = above + row * kinds.len() as i32 + 130;
     let drawn = Canvas::draw(height, |canvas| {
         head(canvas, title, about, &conditions, spread_sentence(last))?;
@@ -114,14 +115,15 @@ pub(super) fn by_task_type(tables: &Tables, about: &About) -> Result<Option<Pict
             let of_kind = |kind: &String| curves(tables, &conditions, kind, measure.key);
             let all: Vec<Vec<Curve>> = kinds.iter().map(of_kind).collect();
             let scale = scale(measure, &all.iter().collect::<Vec<_>>());
+            let names = chart(measure, &scale, last, &[], true, false);
+            names.draw_names(canvas, column_frame(column, above, 0))?;
             for (place, (kind, curves)) in kinds.iter().zip(&all).enumerate() {
-                let top = above + 110 + row * place as i32;
+                let top = above + 60 + row * place as i32;
                 let frame = column_frame(column, top, row - 130);
                 let is_last = place + 1 == kinds.len();
-                chart(measure, &scale, last, curves, place == 0, is_last).draw(canvas, frame)?;
+                chart(measure, &scale, last, curves, false, is_last).draw(canvas, frame)?;
                 if column == 0 {
-                    let y = if place == 0 { top - 118 } else { top - 32 };
-                    canvas.text(kind, (LEFT - 70, y), Side::Start, ROW)?;
+                    canvas.text(kind, (LEFT - 70, top - 30), Side::Start, ROW)?;
                 }
             }
         }

@@ -132,8 +132,7 @@ fn check_values(picture: &Picture, task_type: usize, measures: &[&str]) {
     let axes = axes(&svg);
     assert_eq!(axes.len(), measures.len(), "{}", picture.name);
     // The curves of the legend have two points and stand above every axis.
-    let curves: Vec<_> =
-        curves(&svg).into_iter().filter(|(_, points)| points.len() == 4).collect();
+    let curves: Vec<_> = curves(&svg).into_iter().filter(|(_, points)| points.len() == 4).collect();
     assert_eq!(curves.len(), measures.len() * CONDITIONS.len());
     for (place, (stroke, points)) in curves.iter().enumerate() {
         let (measure, condition) = (place / CONDITIONS.len(), place % CONDITIONS.len());
@@ -306,7 +305,7 @@ fn the_report_holds_everything_and_needs_nothing() {
         "Nobody was asked",
         "apprentice study run --conditions paper,default,seq2seq-grammar --users-per-type 3",
         "role=\"img\" aria-labelledby=\"general-title general-text\"",
-        "<h3>Program complexity</h3>",
+        "<h3>Program complexity per turn</h3>",
         "task type clean",
         "713 of 793 (89.9 %)",
         // The default's second episode of the general table.
@@ -349,7 +348,10 @@ fn a_directory_is_read_back_and_what_is_missing_is_named() {
     write("answered.csv", "condition,answered_by,parses,share\npaper,exemplar,3,1.0000\n");
     let tables = read().unwrap();
     assert_eq!(tables.utterances[0].utterance, "go, \"now\"");
-    assert_eq!((tables.episodes[0].fewest_actions, tables.episodes[0].complexity), (None, Some(2.25)));
+    assert_eq!(
+        (tables.episodes[0].fewest_actions, tables.episodes[0].complexity),
+        (None, Some(2.25))
+    );
     write("answered.csv", "condition,answered_by,parses,share\npaper,exemplar,three,1.0000\n");
     assert_eq!(
         read().unwrap_err(),
