@@ -264,6 +264,7 @@ fn conditions_have_their_dashes_in_the_order_of_the_study() {
     }
     let legend: Vec<&str> = svg
         .descendants()
+        .filter(|node| node.has_tag_name("text"))
         .filter_map(|node| node.text())
         .map(str::trim)
         .filter(|text| CONDITIONS.contains(text))
