@@ -23,6 +23,7 @@ Examples:
   apprentice log show --data demo --user you
   apprentice replay --data demo --user you --at 17
   apprentice audit --data demo --repropose --retrain
+  apprentice study rerun --data demo --with tau=0.1..0.6/0.1
   apprentice salvage --data demo --out rescued
   apprentice checkpoint --data lab --out lab.checkpoint
   apprentice proof --data lab --user ada --seq 17 --out ada-17.proof

@@ -106,15 +106,40 @@ impl Mind {
         self.interpreter(&known).interpret(&moment, utterance)
     }
 
+    /// As [`Mind::interpret`], with another threshold in the place of the mind's own: its weights,
+    /// exemplars and reranker stay as they are. For questions about the past; nobody is ever
+    /// answered with it.
+    ///
+    /// - `threshold`: in the unit of the parser's distances.
+    /// - returns: none when the parser has no threshold.
+    pub fn interpret_within<D: Domain>(
+        &self,
+        moment: Moment<'_, D>,
+        utterance: &Utterance,
+        threshold: f32,
+    ) -> Option<Answer> {
+        let parser = self.parser.within(threshold)?;
+        let known = |word: &str| self.recipe.words().lookup(word).is_some();
+        Some(self.interpreter_of(&parser, &known).interpret(&moment, utterance))
+    }
+
     pub(super) fn interpreter<'a>(
         &'a self,
         known: &'a dyn Fn(&str) -> bool,
     ) -> Interpreter<'a, AnyParser> {
+        self.interpreter_of(&self.parser, known)
+    }
+
+    fn interpreter_of<'a, P>(
+        &'a self,
+        parser: &'a P,
+        known: &'a dyn Fn(&str) -> bool,
+    ) -> Interpreter<'a, P> {
         let settings = self.recipe.settings();
         Interpreter {
             abstraction: &settings.abstraction,
             execution: &settings.execution,
-            parser: &self.parser,
+            parser,
             known,
             reranker: self.reranker.as_ref(),
             seeds: self.seeds,

@@ -144,6 +144,40 @@ impl AnyParser {
     }
 }
 
+/// A parser that holds its distances against another threshold than its own.
+#[derive(Debug, Clone, Copy)]
+pub struct Within<'a> {
+    parser: &'a AnyParser,
+    threshold: f32,
+}
+
+impl AnyParser {
+    /// None for parsers that have no threshold: a grammar and a sequence-to-sequence model answer
+    /// or do not, however far.
+    pub fn within(&self, threshold: f32) -> Option<Within<'_>> {
+        let has_one = matches!(self, AnyParser::Exemplar(_) | AnyParser::Features(_));
+        has_one.then_some(Within { parser: self, threshold })
+    }
+}
+
+impl SemanticParser for Within<'_> {
+    fn parse(&self, clause: &Clause) -> Parse {
+        match self.parser {
+            AnyParser::Exemplar(parser) => parser.parse_within(clause, self.threshold),
+            AnyParser::Features(parser) => parser.parse_within(clause, self.threshold),
+            other => other.parse(clause),
+        }
+    }
+
+    fn chain(&self, so_far: f32, next: f32) -> f32 {
+        self.parser.chain(so_far, next)
+    }
+
+    fn sure_of_order(&self) -> bool {
+        self.parser.sure_of_order()
+    }
+}
+
 impl SemanticParser for AnyParser {
     fn parse(&self, clause: &Clause) -> Parse {
         match self {

@@ -1,12 +1,14 @@
-//! Studies: running the paper's experiments, with simulated teachers or recorded sentences.
+//! `apprentice study`: the paper's experiments, and questions about what was recorded.
 
+mod report;
+mod rerun;
 mod run;
 
 use clap::{Args, Subcommand};
 
 use super::failure::Failure;
 
-/// Run studies: simulated teachers or recorded people at the real service.
+/// Run studies, draw their figures, and ask what another configuration would have answered.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -16,10 +18,14 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Run(run::Arguments),
+    Report(report::Arguments),
+    Rerun(rerun::Arguments),
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     match arguments.verb {
         Verb::Run(arguments) => run::run(arguments),
+        Verb::Report(arguments) => report::run(arguments),
+        Verb::Rerun(arguments) => rerun::run(arguments),
     }
 }

@@ -13,6 +13,7 @@ use super::super::embedded;
 use super::super::eval::tell_bad_lines;
 use super::super::failure::Failure;
 use super::super::recipe;
+use super::report;
 use crate::ids::Digest;
 use crate::learning::Recipe;
 use crate::study::corpus::Corpus;
@@ -151,6 +152,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let tables = Tables::read(&arguments.out, &design, &household, &people)
         .and_then(|tables| tables.write(&arguments.out).map(|()| tables))
         .map_err(|error| no_tables(error, finished.episodes))?;
+    let drawn = report::draw_all(&arguments.out)?;
     let report = match arguments.json {
         true => json_report(&design, &people, &tables, bad_lines),
         false => text_report(&design, &people, &tables, bad_lines),
@@ -159,6 +161,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     stdout.write_all(report.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {
         Failure::failed(format!("the summary cannot be written to standard output: {error}"))
     })?;
+    if let Some(report) = drawn.last() {
+        eprintln!("apprentice: figures and tables together are in {}", report.display());
+    }
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     let cpu = now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9;
     eprintln!(

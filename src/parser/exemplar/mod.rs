@@ -164,12 +164,10 @@ impl ExemplarParser {
         let Exemplar { utterance, program } = self.exemplars[number as usize].clone();
         Near { exemplar: utterance, program, distance, number }
     }
-}
 
-impl SemanticParser for ExemplarParser {
-    fn parse(&self, clause: &Clause) -> Parse {
+    /// As [`SemanticParser::parse`], with another threshold in the place of its own.
+    pub fn parse_within(&self, clause: &Clause, threshold: f32) -> Parse {
         let lifted = &clause.lifted;
-        let threshold = self.threshold();
         if lifted.words.is_empty() {
             return Parse { threshold, ..Parse::default() };
         }
@@ -206,6 +204,12 @@ impl SemanticParser for ExemplarParser {
             threshold,
             exact: exact_programs,
         }
+    }
+}
+
+impl SemanticParser for ExemplarParser {
+    fn parse(&self, clause: &Clause) -> Parse {
+        self.parse_within(clause, self.threshold())
     }
 }
 

@@ -229,7 +229,7 @@ impl FeaturesParser {
     }
 
     /// The readings of one clause as a primitive, likeliest first.
-    fn primitive_offers(&self, clause: &Clause, judged: &[Judged]) -> Vec<Scored> {
+    fn primitive_offers(&self, clause: &Clause, judged: &[Judged], threshold: f32) -> Vec<Scored> {
         let Some(top) = judged.first() else { return Vec::new() };
         let operator = &self.primitives.operators[top.operator].name;
         let nothing_named = clause.lifted.slots() == 0;
@@ -253,7 +253,7 @@ impl FeaturesParser {
                 open: true,
                 by: None,
             })
-            .filter(|scored| scored.distance <= self.threshold())
+            .filter(|scored| scored.distance <= threshold)
             .collect();
         // A landmark on the way that is not here, and "close the door" where nothing is open, hold
         // up nothing else that was said.
@@ -262,7 +262,7 @@ impl FeaturesParser {
             || (nothing_named && self.roles.is_door(operator))
         {
             let distance = 1.0 - sigmoid(top.logit);
-            offers.extend(Some(idle(distance)).filter(|_| distance <= self.threshold()));
+            offers.extend(Some(idle(distance)).filter(|_| distance <= threshold));
         }
         offers
     }
@@ -295,10 +295,11 @@ fn form(knowledge: &Knowledge, lifted: &LiftedUtterance) -> Vec<Word> {
     lifted.words.iter().filter(counts).cloned().collect()
 }
 
-impl SemanticParser for FeaturesParser {
-    fn parse(&self, clause: &Clause) -> Parse {
+impl FeaturesParser {
+    /// As [`SemanticParser::parse`], with another threshold in the place of its own: the same
+    /// distances, held against another number.
+    pub fn parse_within(&self, clause: &Clause, threshold: f32) -> Parse {
         let lifted = &clause.lifted;
-        let threshold = self.threshold();
         if lifted.words.is_empty() {
             return Parse { threshold, ..Parse::default() };
         }
@@ -334,7 +335,7 @@ impl SemanticParser for FeaturesParser {
             let judged = self.judge(clause, &sentence);
             let distances = judged.iter().map(|j| (j.nearest, 1.0 - sigmoid(j.logit)));
             nearest.extend(distances.filter(|(number, _)| !exact.contains(number)));
-            offers.extend(self.primitive_offers(clause, &judged));
+            offers.extend(self.primitive_offers(clause, &judged, threshold));
         }
         // Stable: at equal distance lessons come before primitives, the older before the newer.
         deciding.sort_by(|a, b| a.distance.total_cmp(&b.distance));
@@ -354,6 +355,12 @@ impl SemanticParser for FeaturesParser {
         nearest.truncate(EVIDENCE_NEAREST_MAX);
         let nearest = nearest.into_iter().map(|(number, far)| self.near(number, far)).collect();
         Parse { candidates, nearest, threshold, exact }
+    }
+}
+
+impl SemanticParser for FeaturesParser {
+    fn parse(&self, clause: &Clause) -> Parse {
+        self.parse_within(clause, self.threshold())
     }
 
     /// All clauses must be understood: their probabilities multiply.

@@ -1,0 +1,125 @@
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+
+use clap::Args;
+
+use crate::cli::bar::Bar;
+use crate::cli::failure::Failure;
+use crate::cli::{embedded, past, recipe};
+use crate::ids::TenantId;
+use crate::learning::Recipe;
+use crate::replay;
+use crate::study::rerun::{self, Report, Variant, With};
+use crate::world::household::Household;
+
+/// Ask another configuration everything that recorded people said, each at its own moment.
+///
+/// With another threshold the recorded minds are held fixed and nothing is trained under another
+/// configuration; with another recipe a mind is trained on exactly the lessons that were live then.
+/// What people said next is what they said to the recorded answers: figures are given up to the
+/// first turn of each episode whose action differs, and over all turns. The directory is copied
+/// first and stays as it is.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  apprentice study rerun --data lab --with tau=0.3
+  apprentice study rerun --data lab --with tau=0.1..0.6/0.1 --out sweep.csv
+  apprentice study rerun --data lab --with condition=seq2seq-grammar --user ada
+  apprentice study rerun --data lab --with recipe=mine.toml --json | jq '.variants[].up_to_the_end'
+
+docs/rerun.md says what can be known from such a replay and what can not.
+
+Exit codes: 0 the report is on standard output; 1 somebody's records could not be read, and the
+report says whose; 2 the directory, the person or --with cannot be used.")]
+pub struct Arguments {
+    /// The data directory; it is copied first, and the copy is read
+    /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The other configuration: another threshold (several make a sweep), a recipe that ships
+    /// (default, paper, grammar, seq2seq, seq2seq-grammar), or a recipe file.
+    #[arg(long, value_name = "tau=T[..TO/STEP]|condition=NAME|recipe=FILE")]
+    with: With,
+    /// Only this lab's people.
+    #[arg(long, value_name = "NAME")]
+    tenant: Option<String>,
+    /// Only this person, of the lab that --tenant names, else of `local`.
+    #[arg(long, value_name = "NAME")]
+    user: Option<String>,
+    /// Also write every turn, the same answers too, as a table.
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+    /// One JSON object, without times.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    let variants = variants(&arguments.with)?;
+    let tenant = arguments.tenant.as_deref().map(TenantId::new).transpose();
+    let tenant = tenant.map_err(Failure::bad_input)?;
+    let user = arguments.user.as_deref().map(embedded::user).transpose()?;
+    let past = past::open(arguments.data)?;
+    let streams = match (&tenant, &user) {
+        (tenant, Some(user)) => {
+            vec![past.stream(tenant.as_ref().unwrap_or(&TenantId::local()), user)?]
+        }
+        (Some(tenant), None) => {
+            past.check_tenant(tenant)?;
+            replay::streams_of(&past.store, Some(tenant)).map_err(Failure::failed)?
+        }
+        (None, None) => replay::streams_of(&past.store, None).map_err(Failure::failed)?,
+    };
+    let threads = thread::available_parallelism().map_or(1, |cores| cores.get());
+    let (domain, bar) = (Arc::new(Household::new()), Bar::new("records"));
+    let found = rerun::rerun(&domain, &past.store, &streams, &variants, threads, &bar);
+    bar.finish();
+    if let Some(path) = &arguments.out {
+        std::fs::write(path, rerun::table(&variants, &found.lives)).map_err(|error| {
+            Failure::failed(format!("the table {} cannot be written: {error}", path.display()))
+        })?;
+    }
+    let text = match arguments.json {
+        true => {
+            let text = serde_json::to_string_pretty(&found.report);
+            text.expect("a report has text keys and finite numbers") + "\n"
+        }
+        false => found.report.to_string(),
+    };
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {
+        Failure::failed(format!("the report cannot be written to standard output: {error}"))
+    })?;
+    judge(&found.report)
+}
+
+fn variants(with: &With) -> Result<Vec<Variant>, Failure> {
+    let read = |name: &str| -> Result<Recipe, Failure> {
+        Recipe::parse(&recipe::load(name)?).map_err(Failure::bad_input)
+    };
+    Ok(match with {
+        With::Thresholds(values) => values.iter().map(|tau| Variant::threshold(*tau)).collect(),
+        With::Conditions(names) => {
+            let variant = |name: &String| Ok(Variant::condition(name, read(name)?));
+            names.iter().map(variant).collect::<Result<_, Failure>>()?
+        }
+        With::File(file) => vec![Variant::recipe(read(file)?)],
+    })
+}
+
+/// A report about nobody is none.
+fn judge(report: &Report) -> Result<(), Failure> {
+    if report.left_out.iter().any(|gap| gap.is_fault) {
+        return Err(Failure::differences());
+    }
+    match (report.people, report.left_out.first()) {
+        (0, Some(first)) => Err(Failure::bad_input(format!(
+            "nobody's records can be rerun with this: {}",
+            first.why
+        ))),
+        (0, None) => Err(Failure::bad_input("nobody was recorded there")),
+        _ => Ok(()),
+    }
+}
