@@ -6,8 +6,8 @@ use super::style::{AXIS, INK, RULE, SOFT, look};
 
 /// Up to so many episodes spreads are bars, beyond it bands: bars would stand too close.
 const BARS_MAX: u32 = 10;
-/// Units between the bars of two conditions, so that they do not hide each other.
-const DODGE: f64 = 16.0;
+/// Units between the bars of two conditions, at most, so that they do not hide each other.
+const DODGE_MAX: f64 = 16.0;
 
 /// The curve of one condition.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,7 +134,12 @@ impl Chart<'_> {
     fn dodged(&self, frame: Frame, curve: &Curve, point: &Point) -> i32 {
         let place = self.curves.iter().position(|other| other.look == curve.look).unwrap_or(0);
         let middle = (self.curves.len() as f64 - 1.0) / 2.0;
-        let room = if self.last_episode > BARS_MAX { 0.0 } else { DODGE };
+        // All of them within the middle half of the episode.
+        let step = f64::from(frame.width) / f64::from(self.last_episode.max(1));
+        let room = match self.last_episode > BARS_MAX {
+            true => 0.0,
+            false => DODGE_MAX.min(0.5 * step / self.curves.len() as f64),
+        };
         (self.x(frame, point.episode) + (place as f64 - middle) * room).round() as i32
     }
 

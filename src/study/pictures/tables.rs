@@ -310,11 +310,14 @@ pub(super) fn rows<R: Row>(file: &str, text: &str) -> Result<Vec<R>, TablesError
         .collect()
 }
 
+/// A record's first line, counted from 1, and its fields.
+type Numbered = (usize, Vec<String>);
+
 /// The records of a text of comma-separated values (RFC 4180; lines may end with LF alone), each
 /// with the line on which it begins.
 ///
 /// - errors: the line, and what is wrong there.
-fn records(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
+fn records(text: &str) -> Result<Vec<Numbered>, (usize, String)> {
     let mut records = Vec::new();
     let (mut line, mut begun) = (1, 1);
     let mut fields: Vec<String> = Vec::new();

@@ -83,7 +83,7 @@ struct Asked<D: Domain> {
 
 enum Way<D: Domain> {
     Threshold(f32),
-    Recipe(OtherMinds<D>),
+    Recipe(Box<OtherMinds<D>>),
 }
 
 pub(super) struct Walker<'a, D: Domain> {
@@ -108,7 +108,7 @@ impl<D: Domain> Walker<'_, D> {
     pub fn walk(&self, stream: &StreamId) -> Result<Life, Gap> {
         let way = |variant: &Variant| match &variant.other {
             Other::Threshold(tau) => Way::Threshold(*tau),
-            Other::Recipe(recipe) => Way::Recipe(OtherMinds::new((**recipe).clone())),
+            Other::Recipe(recipe) => Way::Recipe(Box::new(OtherMinds::new((**recipe).clone()))),
         };
         let asked = |variant| Asked { minds: way(variant), mentioned: None };
         let mut here = Here {
