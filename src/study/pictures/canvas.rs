@@ -158,7 +158,10 @@ impl Canvas<'_> {
         whole: (bool, bool),
         colour: RGBColor,
     ) -> Result<(), String> {
-        self.line(&[(x, low), (x, high)], colour, BAR_WIDTH)?;
+        // A line to where it begins is none: everybody agrees.
+        if low != high {
+            self.line(&[(x, low), (x, high)], colour, BAR_WIDTH)?;
+        }
         for (y, is_end) in [(high, whole.1), (low, whole.0)] {
             if is_end {
                 self.line(&[(x - 9, y), (x + 9, y)], colour, BAR_WIDTH)?;

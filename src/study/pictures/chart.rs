@@ -5,7 +5,7 @@ use super::scale::{Scale, episode_ticks};
 use super::style::{AXIS, INK, RULE, SOFT, look};
 
 /// Up to so many episodes spreads are bars, beyond it bands: bars would stand too close.
-const BARS_MAX: u32 = 10;
+pub const BARS_MAX: u32 = 10;
 /// Units between the bars of two conditions, at most, so that they do not hide each other.
 const DODGE_MAX: f64 = 16.0;
 

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::about::About;
 use super::canvas::{Canvas, Hand, Side, WIDTH, width_of};
-use super::chart::{Chart, Curve, Frame, Point};
+use super::chart::{BARS_MAX, Chart, Curve, Frame, Point};
 use super::scale::Scale;
 use super::style::{INK, SOFT, look};
 use super::svg::Picture;
@@ -84,7 +84,8 @@ fn three(
     }
     let height = 920;
     let drawn = Canvas::draw(height, |canvas| {
-        head(canvas, title, about, &conditions, spread_sentence(last))?;
+        let note = spread_sentence(tables, &[task_type], &MEASURES.map(|m| m.key), last);
+        head(canvas, title, about, &conditions, &note)?;
         for (column, measure) in MEASURES.iter().enumerate() {
             let curves = curves(tables, &conditions, task_type, measure.key);
             let scale = scale(measure, &[&curves]);
@@ -110,7 +111,8 @@ pub(super) fn by_task_type(tables: &Tables, about: &About) -> Result<Option<Pict
     let (row, above) = (360, 400);
     let height = above + row * kinds.len() as i32 + 130;
     let drawn = Canvas::draw(height, |canvas| {
-        head(canvas, title, about, &conditions, spread_sentence(last))?;
+        let note = spread_sentence(tables, &names, &MEASURES.map(|m| m.key), last);
+        head(canvas, title, about, &conditions, &note)?;
         for (column, measure) in MEASURES.iter().enumerate() {
             let of_kind = |kind: &String| curves(tables, &conditions, kind, measure.key);
             let all: Vec<Vec<Curve>> = kinds.iter().map(of_kind).collect();
@@ -148,7 +150,8 @@ pub(super) fn first_try(tables: &Tables, about: &About) -> Result<Option<Picture
     let (last, title) = (last_episode(tables, &[ALL]), "Understood at first try");
     let curves = curves(tables, &conditions, ALL, KEY);
     let drawn = Canvas::draw(980, |canvas| {
-        head(canvas, title, about, &conditions, spread_sentence(last))?;
+        let note = spread_sentence(tables, &[ALL], &[KEY], last);
+        head(canvas, title, about, &conditions, &note)?;
         let frame = Frame { left: LEFT + 40, top: 380, width: WIDTH - LEFT - 110, height: 480 };
         let scale = Scale::percent();
         let unit = "of the requests that were said for the first time, right at once";
@@ -189,11 +192,25 @@ pub(super) fn head(
     Ok(())
 }
 
-fn spread_sentence(last_episode: u32) -> &'static str {
-    match last_episode {
-        1..=10 => "Means over users; bars are one standard deviation of the sample up and down.",
-        _ => "Means over users; bands are one standard deviation of the sample up and down.",
-    }
+/// Over how many users, and what the bars or bands are.
+fn spread_sentence(
+    tables: &Tables,
+    task_types: &[&str],
+    drawn: &[&str],
+    last_episode: u32,
+) -> String {
+    let rows = tables.summary.iter().filter(|row| {
+        task_types.contains(&row.task_type.as_str()) && drawn.contains(&row.measure.as_str())
+    });
+    let users: BTreeSet<u32> = rows.map(|row| row.users).collect();
+    let users = match (users.first(), users.last()) {
+        (Some(1), Some(1)) => "1 user".to_owned(),
+        (Some(low), Some(high)) if low != high => format!("{low} to {high} users"),
+        (Some(one), _) => format!("{one} users"),
+        (None, _) => "users".to_owned(),
+    };
+    let mark = if last_episode > BARS_MAX { "bands" } else { "bars" };
+    format!("Means over {users}; {mark} are one standard deviation of the sample up and down.")
 }
 
 fn column_frame(column: usize, top: i32, height: i32) -> Frame {
