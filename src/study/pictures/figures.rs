@@ -210,7 +210,10 @@ fn spread_sentence(
         (None, _) => "users".to_owned(),
     };
     let mark = if last_episode > BARS_MAX { "bands" } else { "bars" };
-    format!("Means over {users}; {mark} are one standard deviation of the sample up and down.")
+    format!(
+        "Means over {users} of each condition; {mark} are one standard deviation of the sample up \
+         and down."
+    )
 }
 
 fn column_frame(column: usize, top: i32, height: i32) -> Frame {

@@ -246,7 +246,7 @@ fn every_picture_says_who_took_part_and_is_told_to_those_who_do_not_see_it() {
             let drawn: Vec<&str> = texts.map(|node| node.text().unwrap().trim()).collect();
             assert!(drawn.contains(&&*about.participants()), "{}: {drawn:?}", picture.name);
             assert!(written("style").contains("@font-face"));
-            let over = "Means over 3 users; bars are one standard deviation";
+            let over = "Means over 3 users of each condition; bars are one standard";
             let has_note = drawn.iter().any(|text| text.starts_with(over));
             assert!(has_note || picture.name == "answered-by", "{}: {drawn:?}", picture.name);
         }
