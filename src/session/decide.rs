@@ -29,7 +29,9 @@ pub(super) fn decide<D: Domain>(
         (_, Command::Open { user, recipe_text, mind }) => open(session, user, recipe_text, *mind),
         (Phase::Idle, Command::StartEpisode { stage }) => start(session, stage),
         (Phase::Interacting, Command::Say { utterance }) => say(session, utterance),
-        (Phase::Interacting, Command::Done) => Ok(vec![end(session, Ending::Abandoned, 0, 0)]),
+        (Phase::Interacting, Command::Done) => {
+            Ok(vec![end(session, Ending::Abandoned, &Adds::default())])
+        }
         (Phase::Teaching, Command::Teach { explains, actions, on_clash }) => {
             teach(session, *explains, actions, *on_clash)
         }
@@ -114,13 +116,15 @@ fn say<D: Domain>(session: &Session<D>, text: &str) -> Result<Vec<Event>, Reject
     let answer = mind.interpret(moment, &utterance);
 
     let mut scene = D::Scene::clone(&episode.scene);
-    let mut carried_out = 0;
+    let mut adds = Adds { utterances: 1, ..Adds::default() };
     if let Outcome::Understood { program, .. } = &answer.outcome {
+        // A guess may be taught even where it ended the episode: it stands in this very batch.
+        adds.guess = answer.guessed().then(|| session.head().next());
         for step in &program.steps {
             domain
                 .step(&mut scene, &episode.task, step)
                 .expect("the interpreter ran this program on the same scene");
-            carried_out += 1;
+            adds.actions += 1;
         }
     }
     let mut events = vec![Event::Interpreted(Interpreted {
@@ -131,19 +135,29 @@ fn say<D: Domain>(session: &Session<D>, text: &str) -> Result<Vec<Event>, Reject
         mind: session.mind_digest(),
     })];
     if domain.achieved(&scene, &episode.task) {
-        events.push(end(session, Ending::Achieved, 1, carried_out));
+        events.push(end(session, Ending::Achieved, &adds));
     }
     Ok(events)
 }
 
-/// `said` and `done` count what this very batch adds: one utterance, and its primitives.
-fn end<D: Domain>(session: &Session<D>, ending: Ending, said: u32, done: u32) -> Event {
+/// What the batch that ends an episode itself adds to it.
+#[derive(Default)]
+struct Adds {
+    utterances: u32,
+    /// Primitives carried out.
+    actions: u32,
+    /// The utterance that ended it, where it was a guess.
+    guess: Option<Seq>,
+}
+
+fn end<D: Domain>(session: &Session<D>, ending: Ending, adds: &Adds) -> Event {
     let episode = episode(&session.state);
+    let before = episode.unexplained.iter().map(|unexplained| unexplained.seq);
     Event::EpisodeEnded(EpisodeEnded {
         ending,
-        utterances: episode.utterances + said,
-        actions: episode.actions.len() as u32 + done,
-        to_teach: episode.unexplained.iter().map(|unexplained| unexplained.seq).collect(),
+        utterances: episode.utterances + adds.utterances,
+        actions: episode.actions.len() as u32 + adds.actions,
+        to_teach: before.chain(adds.guess).collect(),
     })
 }
 

@@ -118,4 +118,46 @@ mod tests {
         assert_eq!(mean, 3.0);
         assert!((sd.unwrap() - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
     }
+
+    fn episode(task_type: &str, user: &str, utterances: u32, wrong: u32) -> EpisodeRow {
+        EpisodeRow {
+            condition: "paper".to_owned(),
+            task_type: task_type.to_owned(),
+            user: user.to_owned(),
+            episode: 1,
+            goal: String::new(),
+            utterances,
+            understood: utterances,
+            not_sure: 0,
+            impossible: 0,
+            wrong,
+            primitives: utterances,
+            fewest_actions: Some(4),
+            normalised_length: Some(f64::from(utterances) / 4.0),
+            complexity: Some(1.0),
+            examples_taught: 44,
+            finished: true,
+            first_tries: (0, 0),
+            reuses: (0, 0),
+        }
+    }
+
+    #[test]
+    fn people_are_summed_up_by_type_over_all_and_those_with_few_episodes_apart() {
+        let episodes =
+            [episode("cool", "a", 4, 1), episode("cool", "b", 8, 0), episode("look", "c", 2, 1)];
+        let rows = summary(&episodes, |row| row.user == "c");
+        let find = |task_type: &str, measure: &str| {
+            let of = |row: &&SummaryRow| row.task_type == task_type && row.measure == measure;
+            rows.iter().find(of).map(|row| (row.users, row.mean))
+        };
+        assert_eq!(find(ALL, "wrong_rate"), Some((2, 0.125)));
+        assert_eq!(find("cool", "normalised_length"), Some((2, 1.5)));
+        assert_eq!(find(FEW, "wrong_rate"), Some((1, 0.5)));
+        assert_eq!(find("look", "wrong_rate"), None);
+        // Nobody tried anything new, and nobody could re-use anything.
+        assert_eq!(find(ALL, "understood_first_try"), None);
+        assert_eq!(find(ALL, "reuse_rate"), None);
+        assert!(rows.is_sorted_by_key(|row| (row.task_type.clone(), row.episode, row.measure)));
+    }
 }

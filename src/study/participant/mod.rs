@@ -15,5 +15,5 @@ mod wording;
 pub use meaning::{Aim, aim, carried_out_as_meant, run_for};
 pub use recorded::{Episode as RecordedEpisode, Said, speak};
 pub use simulated::{Episode as SimulatedEpisode, Person, teach};
-pub use talk::{Talk, TalkError, Turn};
+pub use talk::{Talk, TalkError, Turn, Wire};
 pub use teacher::{Teacher, TeacherError};

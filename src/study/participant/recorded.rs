@@ -2,10 +2,9 @@
 //! then primitives where that was not understood, and afterwards they teach their own words.
 
 use super::parts::{Unit, primitive};
-use super::talk::{Heard, Talk, TalkError, Turn};
+use super::talk::{Heard, Talk, TalkError, Turn, Wire};
 use super::teacher::{Size, Teacher};
 use super::wording::{Names, Shunned, Words, say_plainly};
-use crate::frontends::Client;
 use crate::language::{Program, Step, Symbol, Utterance};
 use crate::study::draw;
 use crate::world::household::{Household, Scene};
@@ -38,11 +37,11 @@ pub struct Episode<'a> {
 
 /// Goes through one episode and teaches after it.
 pub fn speak(
-    client: &Client,
+    wire: &Wire<'_>,
     episode: &Episode<'_>,
     place: String,
 ) -> Result<Vec<Turn>, TalkError> {
-    let talk = Talk::begin(client, episode.household, place, episode.stage, UTTERANCES_MAX)?;
+    let talk = Talk::begin(wire, episode.household, place, episode.stage, UTTERANCES_MAX)?;
     let names = Names::of(episode.household);
     let mut speaker = Speaker { episode, names, talk, shunned: Shunned::new() };
     for said in episode.script {

@@ -6,10 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::parts::{Unit, parts, primitives, whole};
-use super::talk::{Heard, Talk, TalkError, Turn};
+use super::talk::{Heard, Talk, TalkError, Turn, Wire};
 use super::teacher::{Share, Size, Teacher};
 use super::wording::{Names, Shunned, Words, chance, say, say_plainly};
-use crate::frontends::Client;
 use crate::language::{Program, Step, Symbol};
 use crate::numerics::Rng;
 use crate::study::draw;
@@ -80,14 +79,14 @@ impl Person {
 /// - `place`: names condition, person and episode for request ids.
 pub fn teach(
     person: &mut Person,
-    client: &Client,
+    wire: &Wire<'_>,
     episode: &Episode<'_>,
     place: String,
 ) -> Result<Vec<Turn>, TalkError> {
     let number = episode.number.to_string();
     let rng = |what: &str| draw::rng(episode.seed, &[what, episode.user, &number]);
     let said_max = episode.teacher.utterances_max;
-    let talk = Talk::begin(client, episode.household, place, episode.stage, said_max)?;
+    let talk = Talk::begin(wire, episode.household, place, episode.stage, said_max)?;
     let names = Names::of(episode.household);
     let mut speaker = Speaker {
         person,

@@ -63,9 +63,40 @@ pub struct Open<T> {
     settled: bool,
 }
 
+/// The wire as a participant has it: patient as long as the service lives.
+pub struct Wire<'a> {
+    pub client: &'a Client,
+    /// Whether it is worth asking again.
+    pub alive: &'a dyn Fn() -> bool,
+}
+
+/// How often a living service is asked the same, each time as long as the client has patience.
+const ASKED_MAX: usize = 30;
+
+impl Wire<'_> {
+    fn ask<R>(&self, ask: impl Fn(&Client) -> Result<R, ClientError>) -> Result<R, ClientError> {
+        let mut asked = 1;
+        loop {
+            match ask(self.client) {
+                Err(ClientError::NoAnswer { .. } | ClientError::Busy { .. })
+                    if asked < ASKED_MAX && (self.alive)() =>
+                {
+                    asked += 1;
+                }
+                answer => return answer,
+            }
+        }
+    }
+
+    /// Waits until nothing is trained.
+    fn wait(&self) -> Result<(), ClientError> {
+        self.ask(|client| client.wait_until_learned(TRAINING_MAX)).map(|_| ())
+    }
+}
+
 /// A person's end of an episode.
 pub struct Talk<'a, T> {
-    client: &'a Client,
+    wire: &'a Wire<'a>,
     household: &'a Household,
     /// Who and when, which all request ids of the episode follow from.
     place: String,
@@ -88,7 +119,7 @@ impl<'a, T> Talk<'a, T> {
     /// - `place`: names person and episode; two talks of one person never have the same.
     /// - `said_max`: utterances before it is to be given up.
     pub fn begin(
-        client: &'a Client,
+        wire: &'a Wire<'a>,
         household: &'a Household,
         place: String,
         stage: &Stage,
@@ -96,7 +127,7 @@ impl<'a, T> Talk<'a, T> {
     ) -> Result<Talk<'a, T>, TalkError> {
         let (scene, task) = household.stage(stage)?;
         let mut talk = Talk {
-            client,
+            wire,
             household,
             place,
             asked: 0,
@@ -110,7 +141,7 @@ impl<'a, T> Talk<'a, T> {
             said_max,
         };
         // A study that was killed while this person's mind was trained comes back in the middle.
-        client.wait_until_learned(TRAINING_MAX)?;
+        wire.wait()?;
         talk.command(Command::StartEpisode { stage: stage.clone() })?;
         Ok(talk)
     }
@@ -259,7 +290,7 @@ impl<'a, T> Talk<'a, T> {
         }
         if !to_teach.is_empty() {
             self.command(Command::FinishTeaching)?;
-            self.client.wait_until_learned(TRAINING_MAX)?;
+            self.wire.wait()?;
         }
         Ok((taught, self.turns))
     }
@@ -269,6 +300,6 @@ impl<'a, T> Talk<'a, T> {
         self.asked += 1;
         let digest = Digest::of(name.as_bytes());
         let id = RequestId(std::array::from_fn(|index| digest.0[index]));
-        Ok(self.client.command_again(id, command)?)
+        Ok(self.wire.ask(|client| client.command_again(id, command.clone()))?)
     }
 }

@@ -41,7 +41,8 @@ fn live(client: &Client, household: &Household, teacher: &Teacher) -> (Vec<Turn>
         household,
         teacher,
     };
-    let turns = teach(&mut person, client, &episode, format!("test {user} 1")).unwrap();
+    let wire = Wire { client, alive: &|| true };
+    let turns = teach(&mut person, &wire, &episode, format!("test {user} 1")).unwrap();
     (turns, person)
 }
 

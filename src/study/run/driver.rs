@@ -19,12 +19,14 @@ use crate::store::OpenError;
 use crate::study::measures::Entry;
 use crate::study::parallel::Progress;
 use crate::study::participant::{
-    Person, RecordedEpisode, SimulatedEpisode, TalkError, Turn, speak, teach,
+    Person, RecordedEpisode, SimulatedEpisode, TalkError, Turn, Wire, speak, teach,
 };
 use crate::world::household::Household;
 
 /// How long a killed study's last helper may hold its directory.
 const LET_GO: Duration = Duration::from_secs(10);
+/// How long a client waits before it is looked whether the service lives.
+const PATIENCE: Duration = Duration::from_secs(10);
 const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 /// A study to run.
@@ -150,8 +152,6 @@ impl Run<'_> {
             error: Box::new(error),
             state: self.state(done),
         })?;
-        let endpoint =
-            service.endpoint().expect("the service listens where it was told").to_owned();
         let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
         let people: Vec<Mutex<(&Participant, Journal)>> =
             unfinished.into_iter().map(Mutex::new).collect();
@@ -160,7 +160,7 @@ impl Run<'_> {
                 let Some(person) = people.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
                 let mut person = person.lock().expect("each person has one worker");
                 let (participant, journal) = &mut *person;
-                let lived = self.live(condition, &endpoint, participant, journal, done, &stop);
+                let lived = self.live(condition, &service, participant, journal, done, &stop);
                 if let Err(failed) = lived {
                     stop.store(true, Ordering::Relaxed);
                     return Err(failed);
@@ -210,7 +210,7 @@ impl Run<'_> {
     fn live(
         &self,
         condition: &Condition,
-        endpoint: &str,
+        service: &Service,
         participant: &Participant,
         journal: &mut Journal,
         done: &AtomicUsize,
@@ -221,7 +221,10 @@ impl Run<'_> {
             (format!("episode {number} of {user} was cut short"), error)
         };
         let id = UserId::new(user).map_err(|error| failed(1, error.to_string()))?;
+        let endpoint = service.endpoint().expect("the service listens where it was told");
         let client = Client::connect(endpoint, id).map_err(|error| failed(1, error.to_string()))?;
+        let client = client.with_patience(PATIENCE);
+        let wire = Wire { client: &client, alive: &|| service.failed().is_none() };
         let last = journal.lines().last().and_then(|line| line.person.clone());
         let mut person = last.unwrap_or_else(|| Person::new(&self.design.teacher));
         let begun = journal.lines().len();
@@ -230,7 +233,7 @@ impl Run<'_> {
                 return Ok(());
             }
             let turns = self
-                .episode(condition, &client, user, number, planned, &mut person)
+                .episode(condition, &wire, user, number, planned, &mut person)
                 .map_err(|error| failed(number as usize, error.to_string()))?;
             let entry = Entry {
                 episode: number,
@@ -251,7 +254,7 @@ impl Run<'_> {
     fn episode(
         &self,
         condition: &Condition,
-        client: &Client,
+        wire: &Wire<'_>,
         user: &str,
         number: u32,
         planned: &Planned,
@@ -265,12 +268,12 @@ impl Run<'_> {
                 let task = planned.task.as_str();
                 let episode =
                     SimulatedEpisode { seed, user, number, task, stage, household, teacher };
-                teach(person, client, &episode, place)
+                teach(person, wire, &episode, place)
             }
             Some(script) => {
                 let episode =
                     RecordedEpisode { seed, user, number, stage, script, household, teacher };
-                speak(client, &episode, place)
+                speak(wire, &episode, place)
             }
         }
     }
