@@ -72,6 +72,9 @@ fn live(store: &Store, dice: &SeededEntropy, appends: usize) {
 fn salvage_finds_every_record_that_the_database_finds() {
     let (dice, parent) = (dice(), tempfile::tempdir().unwrap());
     let dir = parent.path().join("data");
+    drop(open(&dir).unwrap());
+    let beside = ["keys/server.curve", "checkpoints/ORIGIN", "checkpoints/lab"];
+    beside.iter().for_each(|name| fs::write(dir.join(name), name).unwrap());
     // Old pages, half-filled segments, many openings: the file as it looks after a while.
     for round in 0..6 {
         live(&open(&dir).unwrap(), &dice, 120);
@@ -80,6 +83,9 @@ fn salvage_finds_every_record_that_the_database_finds() {
         assert!(salvaged.is_complete(), "{:?}", salvaged.streams);
         let expected = everything(&open(&dir).unwrap(), &["local", "lab"]);
         assert_eq!(everything(&open(&out).unwrap(), &["local", "lab"]), expected);
+        for name in beside {
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap(), name);
+        }
     }
 }
 
@@ -109,6 +115,8 @@ fn salvage_lists_what_was_lost_and_keeps_each_prefix() {
     let expected = everything(&store, &["local", "lab"]);
     store.erase(&erased).unwrap();
     drop(store);
+    let beside = ["keys/server.curve", "checkpoints/lab"];
+    beside.iter().for_each(|name| fs::write(dir.join(name), name).unwrap());
     let database = dir.join("log/db");
     let bytes = fs::read(&database).unwrap();
     fs::write(&database, &bytes[..bytes.len() / 2]).unwrap();
@@ -118,6 +126,7 @@ fn salvage_lists_what_was_lost_and_keeps_each_prefix() {
     let said = String::from_utf8(run.stdout).unwrap();
     assert!(said.contains("lost: stream local/") && said.contains("kept: "), "{said}");
     assert!(fs::read(&database).unwrap() == before && !dir.join("checking").exists());
+    assert_eq!(beside.map(|name| out.join(name).exists()), [true, false], "held to no checkpoint");
     let rescued = open(&out).unwrap();
     let mut kept = 0;
     for (who, records) in &expected {

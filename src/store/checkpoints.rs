@@ -12,6 +12,8 @@ use std::sync::{Mutex, PoisonError};
 use super::files::{make_dir, sync_dir, write_whole};
 use crate::ids::TenantId;
 
+/// The folder of checkpoints in a data directory.
+pub(super) const CHECKPOINTS: &str = "checkpoints";
 /// A capital letter is in no tenant's name.
 const ORIGIN_FILE: &str = "ORIGIN";
 /// How a line with a signature begins.
@@ -56,12 +58,12 @@ impl CheckpointFeed {
     /// The feed of a data directory that is open for writing, and the folder that it stands in.
     pub(super) fn make(data: &Path) -> io::Result<CheckpointFeed> {
         let feed = CheckpointFeed::of(data, true);
-        make_dir(&data.join("checkpoints")).map(|()| feed)
+        make_dir(&data.join(CHECKPOINTS)).map(|()| feed)
     }
 
     /// The feed of a data directory.
     pub(super) fn of(data: &Path, writable: bool) -> CheckpointFeed {
-        CheckpointFeed(Home::Directory { dir: data.join("checkpoints"), writable })
+        CheckpointFeed(Home::Directory { dir: data.join(CHECKPOINTS), writable })
     }
 
     /// The name of the service, when it was given one.

@@ -2,6 +2,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::checkpoints::CHECKPOINTS;
 use super::files::{make_dir, sync_dir};
 use super::rescue::{Rescue, RescueError, StreamFound};
 use super::sled::Adopter;
@@ -78,6 +79,10 @@ pub fn salvage(dir: &Path, out: &Path) -> Result<Salvaged, SalvageError> {
         salvaged.streams.push(found.map_err(|error| failed(&error))?);
     }
     adopter.finish().map_err(|error| failed(&error))?;
+    if salvaged.is_complete() {
+        copy_checkpoints(&dir.join(CHECKPOINTS), &unfinished.join(CHECKPOINTS))
+            .map_err(|error| failed(&error))?;
+    }
     let named = || {
         if out.exists() {
             fs::remove_dir(out)?;
@@ -94,6 +99,26 @@ fn unfinished(out: &Path) -> PathBuf {
     name.push(".unfinished");
     PathBuf::from(name)
 }
+
+/// The checkpoints that were given out, of a log that lost nothing: it still continues all of them.
+/// One that lost something can be held to none.
+fn copy_checkpoints(from: &Path, to: &Path) -> io::Result<()> {
+    if !from.is_dir() {
+        return Ok(());
+    }
+    make_dir(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        fs::copy(entry.path(), &target)?;
+        fs::File::open(&target)?.sync_all()?;
+    }
+    sync_dir(to)
+}
+
+/// The endings of tenants' secrets and people's keys, of marks of erasure, and of the service's own
+/// key: with another one every client would have to be told whom to trust now.
+const KEY_FILES: [&str; 3] = ["key", "erased", "curve"];
 
 /// Copies key files as they are, marks of erasure included.
 fn copy_keys(from: &Path, to: &Path, lost: &mut Vec<String>) -> io::Result<()> {
@@ -116,7 +141,7 @@ fn copy_keys(from: &Path, to: &Path, lost: &mut Vec<String>) -> io::Result<()> {
                 let entry = entry?;
                 waiting.push((entry.path(), target.join(entry.file_name())));
             }
-        } else if source.extension().is_some_and(|kind| kind == "key" || kind == "erased") {
+        } else if source.extension().is_some_and(|kind| KEY_FILES.iter().any(|own| kind == *own)) {
             // Modes go along.
             let copied = fs::copy(&source, &target)
                 .and_then(|_| fs::File::open(&target)?.sync_all())
