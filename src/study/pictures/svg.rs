@@ -33,7 +33,7 @@ impl Picture {
         Picture { name, title, description: description.to_owned(), svg }
     }
 
-    /// For a page that has the font: see [`font_faces`].
+    /// For a page that has the font: see `font_faces`.
     pub fn inline(&self) -> String {
         let ids = (format!("{}-title", self.name), format!("{}-text", self.name));
         let (width, height) = size(&self.svg);
