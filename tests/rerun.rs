@@ -3,10 +3,9 @@
 
 mod support;
 
+use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::Arc;
-use std::{fs, io::Write};
 
 use apprentice::events::Event;
 use apprentice::grounding::Moment;
@@ -20,6 +19,7 @@ use apprentice::world::Domain;
 use apprentice::world::household::Household;
 use serde_json::Value;
 use support::diary::Diary;
+use support::ran::run;
 use support::toy::Bells;
 
 fn tiny() -> &'static str {
@@ -275,24 +275,6 @@ fn minds_without_a_threshold_are_left_out_of_a_sweep() {
     let [left] = &found.report.left_out[..] else { panic!("{:?}", found.report.left_out) };
     assert_eq!(left.why, "minds of the recipe grammar have no threshold");
     assert!(!left.is_fault);
-}
-
-struct Ran {
-    code: Option<i32>,
-    out: String,
-    err: String,
-}
-
-#[track_caller]
-fn run(arguments: &[&str], input: &str) -> Ran {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
-    command.args(arguments).env_remove("APPRENTICE_LOG");
-    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().unwrap();
-    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
-    let output = child.wait_with_output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    Ran { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
 }
 
 /// A directory that the service wrote: ada taught "wash the mug" and used it.

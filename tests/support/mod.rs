@@ -2,4 +2,5 @@
 #![allow(dead_code)]
 
 pub mod diary;
+pub mod ran;
 pub mod toy;

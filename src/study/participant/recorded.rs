@@ -85,25 +85,26 @@ impl Speaker<'_> {
         for _ in 0..=REPAIRS_MAX {
             let Some(aim) = self.talk.aim(&said.program.steps) else { return Ok(false) };
             let start = self.talk.scene().clone();
-            let mut wrong = false;
-            for step in &aim.program.steps {
-                match self.primitive(step)? {
-                    Heard::Right => {}
-                    Heard::Wrong => {
-                        wrong = true;
-                        break;
-                    }
-                    _ => return Ok(false),
-                }
-            }
-            if !wrong {
-                return Ok(true);
-            }
-            if !self.put_right(&start)? {
-                return Ok(false);
+            match self.primitives(&aim.program)? {
+                Heard::Right => return Ok(true),
+                Heard::Wrong if self.put_right(&start)? => {}
+                _ => return Ok(false),
             }
         }
         Ok(false)
+    }
+
+    /// Asks for one primitive after another.
+    ///
+    /// - returns: what came of the first that was not done as it was meant, if there was one.
+    fn primitives(&mut self, program: &Program) -> Result<Heard, TalkError> {
+        for step in &program.steps {
+            let heard = self.primitive(step)?;
+            if heard != Heard::Right {
+                return Ok(heard);
+            }
+        }
+        Ok(Heard::Right)
     }
 
     /// Asks for one primitive, in other words until it is understood.
@@ -164,22 +165,10 @@ impl Speaker<'_> {
                 return Ok(true);
             }
             let Some(aim) = self.talk.aim(&undo) else { return Ok(true) };
-            let mut wrong = false;
-            for step in &aim.program.steps {
-                if self.talk.over() {
-                    return Ok(false);
-                }
-                match self.primitive(step)? {
-                    Heard::Right => {}
-                    Heard::Wrong => {
-                        wrong = true;
-                        break;
-                    }
-                    _ => return Ok(false),
-                }
-            }
-            if !wrong {
-                return Ok(true);
+            match self.primitives(&aim.program)? {
+                Heard::Right => return Ok(true),
+                Heard::Wrong => {}
+                _ => return Ok(false),
             }
         }
         Ok(true)
