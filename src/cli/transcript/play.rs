@@ -59,6 +59,8 @@ pub(super) struct Player<'a> {
     said: Vec<Said>,
     /// Live lessons and what they explain.
     lessons: Vec<(Seq, String)>,
+    /// A forgotten lesson started a training in this pause between episodes. It may have ended.
+    training: bool,
 }
 
 struct Said {
@@ -71,7 +73,16 @@ struct Said {
 impl<'a> Player<'a> {
     pub fn new(robot: &'a Client, directory: &'a Path) -> Player<'a> {
         let (said, lessons) = (Vec::new(), Vec::new());
-        Player { robot, directory, seed: 1, task: None, scene: None, said, lessons }
+        Player {
+            robot,
+            directory,
+            seed: 1,
+            task: None,
+            scene: None,
+            said,
+            lessons,
+            training: false,
+        }
     }
 
     /// Plays every act.
@@ -174,6 +185,7 @@ impl<'a> Player<'a> {
         for told in &reply.told {
             match told {
                 Told::EpisodeStarted { goal, fewest } => {
+                    self.training = false;
                     let fewest = fewest.map(|n| format!(" (fewest actions: {n})"));
                     let line = format!("episode {goal}{}", fewest.unwrap_or_default());
                     played.act = Some(RealAct::Episode { goal: goal.clone(), line });
@@ -207,9 +219,9 @@ impl<'a> Player<'a> {
                 Told::Forgotten { lesson, .. } => {
                     self.lessons.retain(|(live, _)| live != lesson);
                 }
+                Told::Learning { .. } => self.training = true,
                 Told::EpisodeEnded { ending: Ending::Abandoned, .. }
                 | Told::Opened { .. }
-                | Told::Learning { .. }
                 | Told::Learned { .. }
                 | Told::LearningFailed { .. }
                 | Told::Closed { .. } => {}
@@ -227,9 +239,10 @@ impl<'a> Player<'a> {
     /// Ends teaching, unless a forgotten lesson already started a training, and waits.
     fn learn(&mut self, line: &Line) -> Result<Played, PlayError> {
         let number = line.number;
-        match self.robot.finish_teaching() {
-            Ok(_) | Err(ClientError::Rejected { code: RejectionCode::StillLearning, .. }) => {}
-            Err(error) => return refused(error, number),
+        if !std::mem::take(&mut self.training)
+            && let Err(error) = self.robot.finish_teaching()
+        {
+            return refused(error, number);
         }
         let waited = match self.robot.wait_until_learned(LEARNING_MAX) {
             Ok(waited) => waited,
