@@ -20,7 +20,9 @@ use apprentice::service::{Config, Data, Service};
 use apprentice::session::{OnClash, Phase};
 use apprentice::store::{CacheCounts, Store, copy_private, open};
 use apprentice::world::household::Household;
-use released::{RELEASE, golden, released};
+use released::{golden, released};
+
+const RELEASE: &str = "released-0.1";
 
 fn stream(store: &Store, user: &str) -> StreamId {
     store.keys.stream_id(&TenantId::local(), &UserId::new(user).unwrap()).unwrap()
@@ -46,7 +48,7 @@ fn check_sessions(store: &Store, minds: &Minds) {
 
 #[test]
 fn a_directory_of_the_previous_release_opens_and_rebuilds_to_what_it_was() {
-    let dir = released();
+    let dir = released(RELEASE, "data");
     assert_eq!(layout(dir.path()), "apprentice data directory, layout 1\n");
     let store = open(dir.path()).unwrap();
     assert_eq!(layout(dir.path()), "apprentice data directory, layout 2\n");
@@ -76,14 +78,14 @@ fn layout(dir: &Path) -> String {
 
 #[test]
 fn its_log_reads_as_the_previous_release_read_it() {
-    let dir = released();
+    let dir = released(RELEASE, "data");
     for user in ["ada", "bob"] {
         let shown = Command::new(env!("CARGO_BIN_EXE_apprentice"))
             .args(["log", "show", "--user", user, "--data"])
             .arg(dir.path())
             .output()
             .unwrap();
-        let expected = fs::read_to_string(golden(&format!("{user}.txt"))).unwrap();
+        let expected = fs::read_to_string(golden(RELEASE, &format!("{user}.txt"))).unwrap();
         assert_eq!(String::from_utf8(shown.stdout).unwrap(), expected);
     }
     assert_eq!(
@@ -95,7 +97,7 @@ fn its_log_reads_as_the_previous_release_read_it() {
 
 #[test]
 fn a_private_copy_of_it_rebuilds_alike_and_leaves_it_as_it_was() {
-    let dir = released();
+    let dir = released(RELEASE, "data");
     let before = everything(dir.path());
     let copy = copy_private(dir.path()).unwrap();
     check_sessions(&copy.open().unwrap(), &Minds::default());
@@ -119,7 +121,7 @@ fn everything(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 #[test]
 fn people_go_on_where_they_were_and_old_and_new_records_make_one_chain() {
-    let dir = released();
+    let dir = released(RELEASE, "data");
     let store = open(dir.path()).unwrap();
     let then = records(&store, "bob");
     drop(store);

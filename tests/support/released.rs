@@ -1,20 +1,19 @@
-//! The data directory that release 0.1 wrote.
+//! Data directories that releases wrote.
 
 use std::fs;
 use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-pub const RELEASE: &str = "released-0.1";
-
-pub fn golden(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(RELEASE).join(name)
+/// A file that stands beside what `release` wrote.
+pub fn golden(release: &str, name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(release).join(name)
 }
 
-/// The released directory, unpacked.
-pub fn released() -> tempfile::TempDir {
+/// A directory that `release` wrote, unpacked: `data` or another archive's name.
+pub fn released(release: &str, archive: &str) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let packed = fs::File::open(golden("data.tar.gz")).unwrap();
+    let packed = fs::File::open(golden(release, &format!("{archive}.tar.gz"))).unwrap();
     let mut tar = Vec::new();
     flate2::read::GzDecoder::new(packed).read_to_end(&mut tar).unwrap();
     unpack(&tar, dir.path());
