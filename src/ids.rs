@@ -1,6 +1,12 @@
 //! The names of things: identifiers that cannot be mistaken for one another.
 
+mod within_tenant;
+
+pub use self::within_tenant::WithinTenant;
+
+use std::cmp::Ordering;
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::num::NonZeroU64;
 use std::str::FromStr;
 
@@ -129,10 +135,29 @@ fn check_length(what: &'static str, text: &str, max: usize) -> Result<(), IdErro
 /// One person's life in one tenant: the unit of order, of sealing and of replay.
 ///
 /// `key` is a keyed hash of the user name (`store::keys`), so that names stand in no key.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StreamId {
     pub tenant: TenantId,
     pub key: StreamKey,
+}
+
+// By tenant, then key. Written out because a key alone has no order (see [`StreamKey`]).
+impl Ord for StreamId {
+    fn cmp(&self, other: &StreamId) -> Ordering {
+        (&self.tenant, &self.key.0).cmp(&(&other.tenant, &other.key.0))
+    }
+}
+
+impl PartialOrd for StreamId {
+    fn partial_cmp(&self, other: &StreamId) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Hash for StreamId {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        (&self.tenant, &self.key.0).hash(hasher);
+    }
 }
 
 impl fmt::Display for StreamId {
@@ -144,9 +169,9 @@ impl fmt::Display for StreamId {
 /// Declares a fixed-size byte identifier that reads and prints as lower-case hex and is stored as
 /// MessagePack `bin`.
 macro_rules! byte_id {
-    ($(#[$doc:meta])* $name:ident, $size:expr, $what:literal, $expected:literal) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    ($(#[$attribute:meta])* $name:ident, $size:expr, $what:literal, $expected:literal) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, PartialEq, Eq)]
         pub struct $name(pub [u8; $size]);
 
         impl $name {
@@ -227,23 +252,41 @@ macro_rules! byte_id {
 
 byte_id!(
     /// The keyed hash that stands for a user name. 16 bytes.
+    ///
+    /// It names a stream inside one tenant and no stream among several: every tenant's own stream has
+    /// the same key. So it has no order and no hash, and nothing can be indexed by it alone. Index by
+    /// [`StreamId`], or inside one tenant with [`WithinTenant`].
+    ///
+    /// ```compile_fail,E0277
+    /// let mut streams = std::collections::BTreeMap::new();
+    /// streams.insert(apprentice::ids::StreamKey::TENANT, "the last lab only");
+    /// ```
+    ///
+    /// ```compile_fail,E0277
+    /// let key = apprentice::ids::StreamKey::TENANT;
+    /// std::collections::HashMap::from([(key, "the last lab only")]);
+    /// ```
     StreamKey, 16, "stream key", "32 hexadecimal digits"
 );
 byte_id!(
     /// Names one request of one client, for ever: a retry carries the same one. 16 bytes.
+    #[derive(PartialOrd, Ord, Hash)]
     RequestId, 16, "request id", "32 hexadecimal digits"
 );
 byte_id!(
     /// The public half of a CURVE key (RFC 26): who a connection is. 32 bytes. Reads and prints as
     /// 64 hexadecimal digits; ZeroMQ's own form of 40 characters (Z85) is known to `frontends`.
+    #[derive(PartialOrd, Ord, Hash)]
     PublicKey, 32, "public key", "64 hexadecimal digits"
 );
 byte_id!(
     /// An Ed25519 signature (RFC 8032). 64 bytes.
+    #[derive(PartialOrd, Ord, Hash)]
     Signature, 64, "signature", "128 hexadecimal digits"
 );
 byte_id!(
     /// BLAKE3, 256 bits.
+    #[derive(PartialOrd, Ord, Hash)]
     Digest, 32, "digest", "64 hexadecimal digits"
 );
 

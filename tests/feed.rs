@@ -4,7 +4,6 @@
 #[allow(dead_code)]
 mod toy;
 
-use std::collections::BTreeMap;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
@@ -12,7 +11,7 @@ use apprentice::actors::ErrorCode;
 use apprentice::frontends::{
     BEAT, Client, ClientError, CurveKey, FeedMessage, FollowError, Followed, Follower, Identity,
 };
-use apprentice::ids::{Seq, StreamKey, TenantId, UserId};
+use apprentice::ids::{Seq, TenantId, UserId, WithinTenant};
 use apprentice::service::{Data, Service, StartError};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
@@ -104,16 +103,16 @@ fn read_until(socket: &zmq::Socket, number: u64) -> Vec<(FeedMessage, Vec<u8>)> 
 }
 
 /// How many records there are of a tenant, as an auditor sees it.
-fn heads(client: &Client) -> BTreeMap<StreamKey, u64> {
+fn heads(client: &Client) -> WithinTenant<u64> {
     client.heads().unwrap().into_iter().map(|head| (head.stream, head.seq.get())).collect()
 }
 
 /// Follows until all that stands in the log was given, and holds what was given against it.
-fn drain(follower: &mut Follower, heads: &BTreeMap<StreamKey, u64>, seen: &mut Vec<Followed>) {
+fn drain(follower: &mut Follower, heads: &WithinTenant<u64>, seen: &mut Vec<Followed>) {
     let end = Instant::now() + BOUND;
     let arrived = |follower: &Follower| {
         heads.iter().all(|(stream, seq)| {
-            follower.positions().get(stream).is_some_and(|at| at.seq.get() >= *seq)
+            follower.positions().get(&stream).is_some_and(|at| at.seq.get() >= *seq)
         })
     };
     while !arrived(follower) {
@@ -126,8 +125,8 @@ fn drain(follower: &mut Follower, heads: &BTreeMap<StreamKey, u64>, seen: &mut V
 }
 
 /// Each record once, and none left out.
-fn assert_whole(seen: &[Followed], heads: &BTreeMap<StreamKey, u64>) {
-    let mut counts: BTreeMap<StreamKey, u64> = BTreeMap::new();
+fn assert_whole(seen: &[Followed], heads: &WithinTenant<u64>) {
+    let mut counts: WithinTenant<u64> = WithinTenant::new();
     for followed in seen {
         let (stream, seq) = match followed {
             Followed::Sealed(record) => (record.stream, record.seq),
@@ -138,8 +137,8 @@ fn assert_whole(seen: &[Followed], heads: &BTreeMap<StreamKey, u64>) {
         *count += 1;
         assert_eq!(seq.get(), *count, "stream {stream} in its order, each record once");
     }
-    for (stream, seq) in heads {
-        assert!(counts.get(stream).is_some_and(|count| count >= seq), "stream {stream}: {seq}");
+    for (stream, seq) in heads.iter() {
+        assert!(counts.get(&stream).is_some_and(|count| count >= seq), "stream {stream}: {seq}");
     }
 }
 
@@ -159,7 +158,7 @@ fn a_follower_that_starts_late_is_starved_and_stopped_misses_nothing() {
     let follow = |positions| {
         Follower::sealed(connect(&service, &auditor, "auditor"), positions).with_waiting_max(1)
     };
-    let (mut follower, mut seen) = (follow(BTreeMap::new()), Vec::new());
+    let (mut follower, mut seen) = (follow(WithinTenant::new()), Vec::new());
     drain(&mut follower, &heads(&asks), &mut seen);
     assert!(follower.fetched() >= 18, "what was before it came was asked for");
     // Nobody reads meanwhile, and one message fits.
@@ -225,7 +224,7 @@ fn an_operator_follows_words_and_an_auditor_of_either_lab_sees_none_of_them() {
     begin(&ada);
     say(&ada, 5);
     let stream = *heads(&connect(&service, &auditor, "a")).keys().nth(1).unwrap();
-    let mut follower = Follower::plain(connect(&service, &operator, "o"), BTreeMap::new());
+    let mut follower = Follower::plain(connect(&service, &operator, "o"), WithinTenant::new());
     let mut seen = Vec::new();
     drain(&mut follower, &heads(&connect(&service, &operator, "o")), &mut seen);
     let said = |followed: &&Followed| match followed {
@@ -277,8 +276,8 @@ fn a_key_that_is_taken_back_hears_nothing_more_and_the_others_go_on() {
     let endpoint = endpoint(&service, "lab-a", false);
     let heard = subscribe(&service, &goes, &endpoint);
     read_until(&heard, 0);
-    let mut follower = Follower::sealed(connect(&service, &stays, "s"), BTreeMap::new());
-    let mut gone = Follower::sealed(connect(&service, &goes, "g"), BTreeMap::new());
+    let mut follower = Follower::sealed(connect(&service, &stays, "s"), WithinTenant::new());
+    let mut gone = Follower::sealed(connect(&service, &goes, "g"), WithinTenant::new());
     let (ada, mut seen) = (connect(&service, &gateway, "ada"), Vec::new());
     begin(&ada);
     let stays = connect(&service, &stays, "s");

@@ -160,7 +160,7 @@ impl Reader {
     ) -> Result<Heads, ReadError> {
         let limit = (limit as usize).clamp(1, HEADS_IN_REPLY_MAX);
         let mut streams = self.log.streams(tenant)?;
-        streams.retain(|stream| after.is_none_or(|after| stream.key > after));
+        streams.retain(|stream| after.is_none_or(|after| stream.key.0 > after.0));
         let more = streams.len() > limit;
         let mut heads = Vec::new();
         for stream in streams.into_iter().take(limit) {

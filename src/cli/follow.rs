@@ -13,7 +13,7 @@ use super::embedded;
 use super::failure::Failure;
 use super::passport::Passport;
 use crate::frontends::{Followed, Follower, Position};
-use crate::ids::{Seq, StreamKey};
+use crate::ids::{Seq, StreamKey, WithinTenant};
 
 /// Follow what a lab's service records, and miss nothing: each record once, as soon as it is durable.
 #[derive(Debug, Args)]
@@ -130,12 +130,12 @@ fn show(followed: &Followed, as_json: bool) -> io::Result<()> {
     out.flush()
 }
 
-fn read(path: &Path) -> Result<BTreeMap<StreamKey, Position>, Failure> {
+fn read(path: &Path) -> Result<WithinTenant<Position>, Failure> {
     let bad = |reason: String| {
         Failure::bad_input(format!("{} holds no positions: {reason}", path.display()))
     };
     let text = match fs::read_to_string(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(WithinTenant::new()),
         text => text.map_err(|error| bad(error.to_string()))?,
     };
     let read: BTreeMap<String, (u64, String)> =
@@ -151,7 +151,7 @@ fn read(path: &Path) -> Result<BTreeMap<StreamKey, Position>, Failure> {
 
 fn keep(arguments: &Arguments, follower: &Follower) -> Result<(), Failure> {
     let Some(path) = &arguments.state else { return Ok(()) };
-    let text = |(stream, at): (&StreamKey, &Position)| {
+    let text = |(stream, at): (StreamKey, &Position)| {
         (stream.to_hex(), json!([at.seq.get(), at.digest.to_hex()]))
     };
     let positions: serde_json::Map<String, Value> = follower.positions().iter().map(text).collect();

@@ -5,7 +5,8 @@ use serde_json::json;
 
 use super::data_dir;
 use super::failure::Failure;
-use crate::store::{self, Salvaged};
+use crate::ids::TenantId;
+use crate::store::{self, Salvaged, Share};
 
 /// Rescue what can be read of a damaged data directory into a new one.
 ///
@@ -43,6 +44,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
             for sentence in &lost {
                 println!("lost: {sentence}");
             }
+            for (tenant, share) in salvaged.by_tenant() {
+                println!("{}", of_tenant(tenant, &share));
+            }
             let people = salvaged.streams.iter().filter(|found| !found.stream.is_tenants());
             let people = people.filter(|found| found.valid.seq > 0).count();
             println!("kept: {kept} records of {people} people");
@@ -51,6 +55,19 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     match salvaged.is_complete() {
         true => Ok(()),
         false => Err(Failure::differences()),
+    }
+}
+
+/// One lab's line.
+fn of_tenant(tenant: &TenantId, share: &Share) -> String {
+    let Share { people, records, own, lost, hurt } = share;
+    let kept = format!(
+        "tenant {tenant}: kept {records} records of {people} people and {own} records of its own \
+         (keys, quotas, erasures)"
+    );
+    match hurt {
+        0 => format!("{kept}; lost nothing"),
+        _ => format!("{kept}; lost something of {hurt} streams, {lost} records at least"),
     }
 }
 
@@ -88,5 +105,17 @@ fn as_json(salvaged: &Salvaged, kept: u64) -> serde_json::Value {
             })
         })
         .collect();
-    json!({ "kept": kept, "lost": losses(salvaged), "streams": streams })
+    let share = |share: Share| {
+        json!({
+            "people": share.people,
+            "records": share.records,
+            "own": share.own,
+            "lost": share.lost,
+            "hurt": share.hurt,
+        })
+    };
+    let tenants = salvaged.by_tenant().into_iter();
+    let tenants: serde_json::Map<_, _> =
+        tenants.map(|(tenant, of)| (tenant.to_string(), share(of))).collect();
+    json!({ "kept": kept, "lost": losses(salvaged), "tenants": tenants, "streams": streams })
 }

@@ -1,6 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use crate::ids::{StreamId, StreamKey, TenantId};
+use crate::ids::{StreamId, StreamKey, TenantId, WithinTenant};
 
 /// The trainings that are due: who gets the next free trainer.
 ///
@@ -23,7 +23,7 @@ pub struct Trainings<J> {
 #[derive(Debug)]
 struct Lane<J> {
     order: VecDeque<StreamKey>,
-    jobs: BTreeMap<StreamKey, J>,
+    jobs: WithinTenant<J>,
 }
 
 /// What a tenant had of the trainers. Kept for every tenant that ever trained, so that nobody gains
@@ -61,7 +61,7 @@ impl<J> Trainings<J> {
         let lane = self
             .waiting
             .entry(stream.tenant.clone())
-            .or_insert_with(|| Lane { order: VecDeque::new(), jobs: BTreeMap::new() });
+            .or_insert_with(|| Lane { order: VecDeque::new(), jobs: WithinTenant::new() });
         lane.order.push_back(stream.key);
         lane.jobs.insert(stream.key, job);
         Ok(None)

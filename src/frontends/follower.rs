@@ -1,12 +1,12 @@
 //! The other end of the feed: misses nothing, whatever the feed drops.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use super::feed::FeedMessage;
 use super::{Client, ClientError, Context};
 use crate::actors::{HeadView, PlainView, SealedView};
-use crate::ids::{Digest, RequestId, Seq, StreamKey};
+use crate::ids::{Digest, RequestId, Seq, StreamKey, WithinTenant};
 
 /// Follows all streams of a tenant: gives each record once, each stream in its order. What the feed
 /// dropped is asked for at the door and held against the digests that were seen.
@@ -18,7 +18,7 @@ pub struct Follower {
     waiting_max: i32,
     /// The run of the feed, and the last number that is accounted for.
     heard: Option<(RequestId, u64)>,
-    positions: BTreeMap<StreamKey, Position>,
+    positions: WithinTenant<Position>,
     ready: VecDeque<Followed>,
     /// When to look at the door whether anything happened, unless the feed is heard before.
     look_at: Instant,
@@ -72,16 +72,16 @@ impl Follower {
     /// Follows sealed records, as an auditor or operator.
     ///
     /// - `positions`: up to where they are known already.
-    pub fn sealed(client: Client, positions: BTreeMap<StreamKey, Position>) -> Follower {
+    pub fn sealed(client: Client, positions: WithinTenant<Position>) -> Follower {
         Follower::new(client, Kind::Sealed, positions)
     }
 
     /// Follows records in the clear, as an operator.
-    pub fn plain(client: Client, positions: BTreeMap<StreamKey, Position>) -> Follower {
+    pub fn plain(client: Client, positions: WithinTenant<Position>) -> Follower {
         Follower::new(client, Kind::Plain, positions)
     }
 
-    fn new(client: Client, kind: Kind, positions: BTreeMap<StreamKey, Position>) -> Follower {
+    fn new(client: Client, kind: Kind, positions: WithinTenant<Position>) -> Follower {
         Follower {
             client,
             kind,
@@ -102,7 +102,7 @@ impl Follower {
         self
     }
 
-    pub fn positions(&self) -> &BTreeMap<StreamKey, Position> {
+    pub fn positions(&self) -> &WithinTenant<Position> {
         &self.positions
     }
 

@@ -159,7 +159,7 @@ pub fn audit<D: Domain>(
         work();
     });
     let mut streams = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    streams.sort_by(|a: &StreamReport, b| (&a.tenant, a.stream).cmp(&(&b.tenant, b.stream)));
+    streams.sort_by(|a: &StreamReport, b| (&a.tenant, a.stream.0).cmp(&(&b.tenant, b.stream.0)));
     let mut counts = Counts::default();
     streams.iter().for_each(|stream| counts.add(&stream.counts));
     AuditReport { streams, counts }

@@ -91,7 +91,16 @@ pub fn export(dir: &Path, tenant: &TenantId, path: &Path) -> Result<Exported, Ex
     }
     let (mut streams, _) = rescue.streams();
     streams.retain(|stream| stream.tenant == *tenant);
-    if streams.is_empty() {
+    // First how far each goes, then its records: only one of them is in memory at a time.
+    let mut whole = Vec::new();
+    for stream in streams {
+        let found = rescue.walk(&stream, |_, _| Ok::<(), ExportError>(()))?;
+        if !found.losses.is_empty() {
+            return Err(ExportError::Damaged { found: Box::new(found) });
+        }
+        whole.extend((found.valid != Head::EMPTY).then_some((stream, found.valid)));
+    }
+    if whole.is_empty() {
         return Err(ExportError::Empty { tenant: tenant.clone() });
     }
     let fresh = beside(path);
@@ -100,19 +109,13 @@ pub fn export(dir: &Path, tenant: &TenantId, path: &Path) -> Result<Exported, Ex
     let mut exported = Exported { people: 0, records: 0 };
     let written = (|| {
         out.frame(TENANT, &[tenant.as_str().as_bytes()]).map_err(|e| failed(path, &e))?;
-        for stream in streams {
-            // First how far it goes, then its records: only one of them is in memory at a time.
-            let found = rescue.walk(&stream, |_, _| Ok::<(), ExportError>(()))?;
-            if !found.losses.is_empty() {
-                return Err(ExportError::Damaged { found: Box::new(found) });
-            }
+        for (stream, head) in whole {
             let key_path = dir.join("keys").join(super::keys::user_file(&stream));
             let key = match fs::read(&key_path) {
                 Ok(key) => key,
                 Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
                 Err(error) => return Err(failed(&key_path, &error)),
             };
-            let head = found.valid;
             let (seq, digest) = (head.seq.to_be_bytes(), head.digest.0);
             out.frame(PERSON, &[&stream.key.0, &seq, &digest, &key])
                 .map_err(|e| failed(path, &e))?;

@@ -26,10 +26,10 @@ use std::path::{Path, PathBuf};
 
 use super::files::{beside, create, sync_dir};
 use crate::events::Head;
-use crate::ids::{Digest, StreamId, StreamKey, TenantId};
+use crate::ids::{Digest, StreamId, StreamKey, TenantId, WithinTenant};
 
 /// Where each stream ends.
-pub(super) type Heads = BTreeMap<TenantId, BTreeMap<StreamKey, Head>>;
+pub(super) type Heads = BTreeMap<TenantId, WithinTenant<Head>>;
 
 const MAGIC: &[u8; 4] = b"APH1";
 const FRAME_HEAD_BYTES: usize = 4 + 1 + 4 + 4;
@@ -77,7 +77,7 @@ impl HeadsFile {
 
     /// Appends the heads of one group; durable on return.
     pub(super) fn append(&mut self, changed: &BTreeMap<StreamId, Head>) -> io::Result<()> {
-        let entries = changed.iter().map(|(stream, head)| (&stream.tenant, &stream.key, head));
+        let entries = changed.iter().map(|(stream, head)| (&stream.tenant, stream.key, head));
         let bytes = frame(GROUP, entries);
         let end = self.end + bytes.len() as u64;
         if end > self.reserved {
@@ -122,7 +122,7 @@ fn reserve(file: &File, end: u64) -> io::Result<u64> {
 
 fn frame<'a>(
     kind: u8,
-    entries: impl Iterator<Item = (&'a TenantId, &'a StreamKey, &'a Head)>,
+    entries: impl Iterator<Item = (&'a TenantId, StreamKey, &'a Head)>,
 ) -> Vec<u8> {
     let mut payload = Vec::new();
     for (tenant, key, head) in entries {
@@ -243,7 +243,7 @@ mod tests {
         let end = usize::try_from(file.end).unwrap();
         let whole = fs::read(&path).unwrap();
         let group_bytes =
-            frame(GROUP, group(1, 4).iter().map(|(s, h)| (&s.tenant, &s.key, h))).len();
+            frame(GROUP, group(1, 4).iter().map(|(s, h)| (&s.tenant, s.key, h))).len();
         for cut in 1..group_bytes {
             let torn = parse(&whole[..end - cut]);
             assert_eq!((seqs(&torn), torn.damage), (vec![3, 1], None), "{cut} bytes fewer");

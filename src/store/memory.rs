@@ -5,14 +5,14 @@ use super::log::{Pending, ReadError, SealedRecords};
 use super::sealing::before;
 use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
 use crate::events::{Batch, Durable, Head, Header, Record};
-use crate::ids::{Seq, StreamId, StreamKey, TenantId};
+use crate::ids::{Seq, StreamId, StreamKey, TenantId, WithinTenant};
 
 /// The log without a disk: the same bytes, the same checks, and its promises are kept at once.
 ///
 /// *Durable* here means: as long as the value lives.
 pub struct MemoryLog {
     keys: Arc<Keys>,
-    streams: RwLock<BTreeMap<TenantId, BTreeMap<StreamKey, Stream>>>,
+    streams: RwLock<BTreeMap<TenantId, WithinTenant<Stream>>>,
     /// Of all frames of a tenant.
     bytes: RwLock<BTreeMap<TenantId, u64>>,
 }
@@ -121,8 +121,8 @@ impl EventLog for MemoryLog {
 
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         let streams = self.streams.read().expect("no append panics while it holds the log");
-        let keys = streams.get(tenant).into_iter().flat_map(BTreeMap::keys);
-        Ok(keys.map(|&key| StreamId { tenant: tenant.clone(), key }).collect())
+        let keys = streams.get(tenant).into_iter().flat_map(WithinTenant::keys);
+        Ok(keys.map(|key| StreamId { tenant: tenant.clone(), key }).collect())
     }
 
     fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {

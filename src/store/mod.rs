@@ -44,7 +44,7 @@ pub use self::models::ModelStore;
 pub use self::open::{HISTORY_FILE, OpenError, Store, open, open_memory};
 pub use self::origin::{CacheCounter, CacheCounts, Found, Origin};
 pub use self::rescue::{Loss, RescueError, StreamFound};
-pub use self::salvage::{SalvageError, Salvaged, salvage};
+pub use self::salvage::{SalvageError, Salvaged, Share, salvage};
 pub use self::sealing::{DataKey, Draft, Sealed, Walk};
 pub use self::sled::{Damage, SledLog};
 pub use self::snapshots::SnapshotStore;

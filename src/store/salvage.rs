@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,6 +8,7 @@ use super::files::{make_dir, sync_dir};
 use super::rescue::{Rescue, RescueError, StreamFound};
 use super::sled::Adopter;
 use super::{OpenError, open};
+use crate::events::Head;
 use crate::ids::TenantId;
 
 /// What a salvage copied and what it could not.
@@ -19,6 +21,21 @@ pub struct Salvaged {
     pub heads_damage: Option<String>,
     /// Key files that could not be copied, each in a sentence.
     pub lost_keys: Vec<String>,
+}
+
+/// What a salvage copied of one lab, and what of it it could not.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Share {
+    /// People of whom a record was kept.
+    pub people: u64,
+    /// Their records.
+    pub records: u64,
+    /// Records kept of the lab's own stream: its keys, quotas, retirements, erasures.
+    pub own: u64,
+    /// Records that were acknowledged and are not kept, as far as the heads file tells.
+    pub lost: u64,
+    /// Streams of which something is lost, a key or records of unknown number among it.
+    pub hurt: u64,
 }
 
 /// Why nothing was salvaged.
@@ -40,6 +57,25 @@ impl Salvaged {
             && self.unclaimed == 0
             && self.heads_damage.is_none()
             && self.lost_keys.is_empty()
+    }
+
+    /// What was kept and lost of each lab of which anything was found.
+    pub fn by_tenant(&self) -> BTreeMap<&TenantId, Share> {
+        let mut shares: BTreeMap<_, Share> = BTreeMap::new();
+        for found in &self.streams {
+            let share = shares.entry(&found.stream.tenant).or_default();
+            let kept = found.valid.seq;
+            match found.stream.is_tenants() {
+                true => share.own += kept,
+                false => {
+                    share.people += u64::from(kept > 0);
+                    share.records += kept;
+                }
+            }
+            share.lost += found.acknowledged.map_or(0, |all| all.saturating_sub(kept));
+            share.hurt += u64::from(!found.losses.is_empty());
+        }
+        shares
     }
 }
 
@@ -76,7 +112,10 @@ pub fn salvage(dir: &Path, out: &Path) -> Result<Salvaged, SalvageError> {
     salvaged.unclaimed = unclaimed;
     for stream in streams {
         let found = rescue.walk(&stream, |head, frame| adopter.put(&stream, head, frame));
-        salvaged.streams.push(found.map_err(|error| failed(&error))?);
+        let found = found.map_err(|error| failed(&error))?;
+        // A key may have been made and nothing said.
+        let is_there = found.valid != Head::EMPTY || !found.losses.is_empty();
+        salvaged.streams.extend(is_there.then_some(found));
     }
     adopter.finish().map_err(|error| failed(&error))?;
     if salvaged.is_complete() {

@@ -43,6 +43,12 @@ const CACHE_BYTES: u64 = 64 * 1024 * 1024;
 /// Streams with records have their records in the tree `events/<tenant>`.
 const TREE_PREFIX: &str = "events/";
 
+/// Whose records stand in the tree of that name; none for trees that hold no records.
+pub(super) fn tenant_of_tree(name: &[u8]) -> Option<TenantId> {
+    let name = std::str::from_utf8(name).ok()?.strip_prefix(TREE_PREFIX)?;
+    TenantId::new(name).ok()
+}
+
 /// The embedded log.
 ///
 /// *Durable* means: batch applied, `flush`, `fdatasync` of sled's file (its flush alone does not
@@ -305,7 +311,7 @@ impl EventLog for SledLog {
     fn streams(&self, tenant: &TenantId) -> Result<Vec<StreamId>, ReadError> {
         let heads = self.shared.heads.read().expect("no holder of the heads panics");
         let keys = heads.get(tenant).into_iter().flat_map(|streams| streams.keys());
-        Ok(keys.map(|&key| StreamId { tenant: tenant.clone(), key }).collect())
+        Ok(keys.map(|key| StreamId { tenant: tenant.clone(), key }).collect())
     }
 
     fn tenants(&self) -> Result<Vec<TenantId>, ReadError> {
@@ -435,9 +441,7 @@ fn compare(db: &::sled::Db, recorded: &Heads) -> Result<Heads, LogError> {
     let mut heads = Heads::new();
     let mut damage = Vec::new();
     for name in db.tree_names() {
-        let tenant =
-            std::str::from_utf8(&name).ok().and_then(|name| name.strip_prefix(TREE_PREFIX));
-        let Some(tenant) = tenant.and_then(|name| TenantId::new(name).ok()) else { continue };
+        let Some(tenant) = tenant_of_tree(&name) else { continue };
         let tree = db.open_tree(&name).map_err(database_error)?;
         let known = recorded.get(&tenant);
         for (key, seq) in last_seqs(&tree).map_err(LogError::Database)? {
@@ -452,7 +456,7 @@ fn compare(db: &::sled::Db, recorded: &Heads) -> Result<Heads, LogError> {
         }
     }
     for (tenant, streams) in recorded {
-        for (&key, head) in streams {
+        for (key, head) in streams.iter() {
             let stream = StreamId { tenant: tenant.clone(), key };
             let seen = heads.get(tenant).is_some_and(|streams| streams.contains_key(&key));
             let reported = damage.iter().any(|damage| damage.stream() == Some(&stream));

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use crate::events::{Event, Head, PersonErased, Quotas, Record, Role, SegmentClosed, TenantEvent};
-use crate::ids::{PublicKey, Seq, StreamKey, Timestamp};
+use crate::ids::{PublicKey, Seq, StreamKey, Timestamp, WithinTenant};
 
 /// A tenant's stream, folded.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,9 +10,9 @@ pub struct Registry {
     last_at: Timestamp,
     opened: bool,
     standing: Standing,
-    erased: BTreeMap<StreamKey, PersonErased>,
+    erased: WithinTenant<PersonErased>,
     segments: Vec<Segment>,
-    covered: BTreeMap<StreamKey, Seq>,
+    covered: WithinTenant<Seq>,
 }
 
 /// What the doors must know of a tenant.
@@ -56,9 +56,9 @@ impl Default for Registry {
             last_at: Timestamp::default(),
             opened: false,
             standing: Standing::default(),
-            erased: BTreeMap::new(),
+            erased: WithinTenant::new(),
             segments: Vec::new(),
-            covered: BTreeMap::new(),
+            covered: WithinTenant::new(),
         }
     }
 }
@@ -137,7 +137,7 @@ impl Registry {
     }
 
     /// Everybody who was erased, by their stream.
-    pub fn erased(&self) -> &BTreeMap<StreamKey, PersonErased> {
+    pub fn erased(&self) -> &WithinTenant<PersonErased> {
         &self.erased
     }
 

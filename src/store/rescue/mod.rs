@@ -7,5 +7,6 @@
 mod directory;
 mod index;
 mod pages;
+mod trees;
 
 pub use self::directory::{Loss, Rescue, RescueError, StreamFound};

@@ -7,14 +7,18 @@
 //! | 1 | kind |
 //! | 1–9 each | length of the body, number of the segment, number of the page |
 //!
-//! The body of a page's base holds a leaf (keys without their common prefix, then values); the body of
-//! a later update holds one key and one value.
+//! The body of a page's base holds a leaf (keys without their common prefix, then values) or an index
+//! (keys, then the numbers of the pages below); the body of a later update holds one key and one value.
+//! Page 0 holds the names of the trees, each with the number of its topmost page. No key and no leaf
+//! says of which tree it is: only the way down from the name does.
 
 /// The size that `open_database` leaves at its default.
 pub(super) const SEGMENT_BYTES: usize = 512 * 1024;
 const SEGMENT_HEAD_BYTES: usize = 20;
 
 const BATCH: u8 = 3;
+const FREE: u8 = 4;
+const ROOTS: u8 = 6;
 const BASE: u8 = 8;
 const UPDATE: u8 = 10;
 const KIND_MAX: u8 = 11;
@@ -35,6 +39,10 @@ pub(super) enum Item<'s> {
     Base(Value<'s>),
     /// A value that was set later: the prefix is that of the page's base.
     Update(Value<'s>),
+    /// From here on these pages stand beside and below `page`; none when it was given up.
+    Page { page: u64, leads_to: Vec<u64> },
+    /// From here on these are all trees: name and topmost page.
+    Roots(Vec<(&'s [u8], u64)>),
     /// The messages from here to the position `until` count together or not at all.
     Batch { until: u64 },
     /// Bytes that belong to no whole message.
@@ -67,7 +75,12 @@ pub(super) fn walk<'s>(segment: &'s [u8], mut found: impl FnMut(Option<u64>, Ite
         last = last.max(base.map_or(0, |lsn| lsn + end as u64));
         let bytes = &segment[body..end];
         let read = match message.kind {
-            BASE => leaf(bytes, body, message.page, &mut |value| found(lsn, Item::Base(value))),
+            BASE => node(bytes, body, message.page, &mut |item| found(lsn, item)),
+            FREE => {
+                found(lsn, Item::Page { page: message.page, leads_to: Vec::new() });
+                Some(())
+            }
+            ROOTS => roots(bytes).map(|roots| found(lsn, Item::Roots(roots))),
             UPDATE => set(bytes, body, message.page, &mut |value| found(lsn, Item::Update(value))),
             BATCH => {
                 if let Some(bytes) = bytes.first_chunk() {
@@ -159,16 +172,16 @@ fn take<'b>(bytes: &mut &'b [u8]) -> Option<&'b [u8]> {
 }
 
 /// Reads a page's base; `body` is where `bytes` stand in the segment.
-fn leaf<'s>(
+fn node<'s>(
     bytes: &'s [u8],
     body: usize,
     page: u64,
-    found: &mut dyn FnMut(Value<'s>),
+    found: &mut dyn FnMut(Item<'s>),
 ) -> Option<()> {
     let whole = bytes.len();
     let mut rest = bytes;
-    number(&mut rest)?;
-    number(&mut rest)?;
+    // The next page of the same level, and one that is being merged into this; 0 for none.
+    let mut leads_to = vec![number(&mut rest)?, number(&mut rest)?];
     let (_merging, after) = rest.split_first()?;
     let (&prefix, after) = after.split_first()?;
     rest = after;
@@ -177,20 +190,31 @@ fn leaf<'s>(
     let prefix = low.get(..usize::from(prefix))?;
     let (&kind, after) = rest.split_first()?;
     rest = after;
-    if kind != 0 {
-        return Some(()); // A page that points to others.
-    }
     let count = usize::try_from(number(&mut rest)?).ok()?;
     let mut suffixes = Vec::new();
     for _ in 0..count {
         suffixes.push(take(&mut rest)?);
     }
     for suffix in suffixes {
+        if kind != 0 {
+            leads_to.push(number(&mut rest)?);
+            continue;
+        }
         let value = take(&mut rest)?;
         let start = body + whole - rest.len() - value.len();
-        found(Value { page, prefix, suffix, start, bytes: value.len() });
+        found(Item::Base(Value { page, prefix, suffix, start, bytes: value.len() }));
     }
+    leads_to.retain(|&page| page != 0);
+    found(Item::Page { page, leads_to });
     Some(())
+}
+
+fn roots(mut bytes: &[u8]) -> Option<Vec<(&[u8], u64)>> {
+    let mut roots = Vec::new();
+    while !bytes.is_empty() {
+        roots.push((take(&mut bytes)?, number(&mut bytes)?));
+    }
+    Some(roots)
 }
 
 fn set<'s>(

@@ -23,7 +23,7 @@ pub(in super::super) fn check_log(dir: &Path) -> Result<(), LogError> {
     for (tenant, streams) in heads {
         let tree = guarded(|| db.open_tree(format!("{TREE_PREFIX}{tenant}")));
         let tree = tree.map_err(LogError::Database)?.map_err(super::database_error)?;
-        for (key, head) in streams {
+        for (key, &head) in streams.iter() {
             let walked = guarded(|| walk(&tree, key, head));
             let walked = walked.unwrap_or_else(|reason| Err(super::store_error(reason)));
             if let Err(error) = walked {
