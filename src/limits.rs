@@ -74,6 +74,9 @@ pub const COMMIT_S_MAX: u64 = 15;
 pub const TENANT_KEYS_MAX: usize = 1_024;
 /// Bytes of what an operator writes beside an order: a key's label, a reason.
 pub const LABEL_BYTES_MAX: usize = 200;
+/// Seconds that a retired key may stay good beside its successor: 30 days. Longer ones are made by
+/// retiring the key later.
+pub const OVERLAP_S_MAX: u64 = 30 * 24 * 60 * 60;
 /// Orders waiting for the registrar; then an honest `Busy`.
 pub const REGISTRAR_QUEUE_MAX: usize = 4_096;
 

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use apprentice::actors::{
     AnswerTo, Ask, ErrorCode, Failure, Front, House, HouseSettings, NotTaken, Response, Submit,
+    wall_clock,
 };
 use apprentice::events::{Batch, Event, SessionClosed};
 use apprentice::frontends::fresh_id;
@@ -30,6 +31,7 @@ fn settings(store: Store, failure: &Failure) -> HouseSettings<Bells> {
         arbiters: 2,
         awake_max: 8,
         failure: failure.clone(),
+        clock: wall_clock(),
     }
 }
 

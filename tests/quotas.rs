@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use apprentice::actors::{
     AnswerTo, Ask, Failure, Front, House, HouseSettings, NotTaken, Quota, Refusals, Registrar,
-    Response, Submit,
+    Response, Submit, wall_clock,
 };
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
@@ -34,6 +34,7 @@ fn house(store: Store, gate: Option<&Arc<Gate>>) -> House {
         arbiters: 2,
         awake_max: 64,
         failure: Failure::default(),
+        clock: wall_clock(),
     })
     .unwrap()
 }

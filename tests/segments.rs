@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use apprentice::actors::{
     AnswerTo, Ask, Book, Failure, House, HouseSettings, OrderError, Response, Submit, fold_tenant,
+    wall_clock,
 };
 use apprentice::events::{Batch, Event, EventKind, Head, Record, SessionClosed};
 use apprentice::evidence::{Proof, VerifyError, verify};
@@ -378,6 +379,7 @@ fn house(store: Store) -> House {
         arbiters: 1,
         awake_max: 8,
         failure: Failure::default(),
+        clock: wall_clock(),
     })
     .unwrap()
 }

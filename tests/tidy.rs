@@ -286,6 +286,7 @@ fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
         "grounding",
         "learning",
         "session",
+        "tenancy",
         "ids",
         "limits",
         "invariants",

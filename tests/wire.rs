@@ -361,6 +361,7 @@ fn responses() -> Vec<(&'static str, Response)> {
                     label: "robot in room 7".into(),
                     admitted_at: Timestamp(1_790_000_000_000_000),
                     valid_until: Some(Timestamp(1_790_604_800_000_000)),
+                    retired: false,
                 }],
             }]),
         ),

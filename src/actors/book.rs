@@ -1,14 +1,13 @@
 use std::collections::BTreeMap;
-use std::time::{SystemTime, UNIX_EPOCH};
 
-use super::Growths;
 use super::life::fresh_request;
+use super::{Growths, wall_clock};
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};
-use crate::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
+use crate::ids::{Seq, StreamId, TenantId, UserId};
 use crate::replay::{self, CheckpointsError, Through};
 use crate::store::{AppendError, KeyError, ReadError, Store};
-use crate::tenancy::{self, Admissions, Disagreement, Order, Refusal, Registry};
+use crate::tenancy::{self, Admissions, Clock, Disagreement, Order, Refusal, Registry};
 
 /// The tenants of a store and their own streams, of which this is the only writer. A running
 /// service has one, behind its registrar; so has a command about a closed directory.
@@ -51,10 +50,15 @@ pub enum OrderError {
 impl Book {
     /// Folds every tenant's own stream.
     pub fn open(store: Store) -> Result<Book, OrderError> {
+        Book::open_by(store, wall_clock())
+    }
+
+    /// As [`Book::open`], by another clock than the machine's.
+    pub fn open_by(store: Store, clock: Clock) -> Result<Book, OrderError> {
         let mut book = Book {
             store,
             registries: BTreeMap::new(),
-            admissions: Admissions::default(),
+            admissions: Admissions::new(clock),
             growths: Growths::default(),
         };
         let local = TenantId::local();
@@ -105,6 +109,20 @@ impl Book {
         {
             return Err(OrderError::KeyOfOther);
         }
+        // The doors may have seen its overlap end when no record says so yet.
+        let now = match order {
+            Order::Admit { key, .. } | Order::Rotate { new: key, .. }
+                if self.admissions.is_gone(tenant, key) =>
+            {
+                let refusal = Refusal::Retired { key: *key };
+                return Err(OrderError::Refused { tenant: tenant.clone(), refusal });
+            }
+            Order::Retire { key, .. } if self.admissions.is_gone(tenant, key) => {
+                Some(Order::Retire { key: *key, overlap_seconds: 0 })
+            }
+            _ => None,
+        };
+        let order = now.as_ref().unwrap_or(order);
         // The tenant of the single-user default is there without having been added.
         if *tenant == TenantId::local() && *order != Order::Open && !self.is_open(tenant) {
             self.obey(tenant, &Order::Open)?;
@@ -116,8 +134,8 @@ impl Book {
         }
         let unknown = !self.registries.contains_key(tenant);
         let registry = self.registries.entry(tenant.clone()).or_default();
-        let at = registry.next_at(now());
-        let events = match tenancy::decide(registry, order, at) {
+        let wall = self.admissions.clock().read();
+        let events = match tenancy::decide(registry, order, wall) {
             Ok(events) if events.is_empty() => return Ok(events),
             Ok(events) => events,
             Err(refusal) => {
@@ -128,6 +146,7 @@ impl Book {
                 return Err(OrderError::Refused { tenant: tenant.clone(), refusal });
             }
         };
+        let at = registry.next_at(wall);
         let batch = Batch { request: fresh_request(), at, events: events.clone() };
         let stream = StreamId::of_tenant(tenant);
         let appended = self.store.log.append(&stream, registry.head(), batch).wait();
@@ -304,11 +323,6 @@ pub fn fold(store: &Store, tenant: &TenantId) -> Result<Registry, OrderError> {
     Ok(registry)
 }
 
-fn now() -> Timestamp {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    Timestamp(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -339,7 +353,7 @@ mod tests {
         drop(book);
         let book = Book::open(store::open(dir.path()).unwrap()).unwrap();
         assert_eq!(book.registry(&lab()), before);
-        let admitted = book.admissions().admit(&KEY, now()).unwrap();
+        let admitted = book.admissions().admit(&KEY).unwrap();
         assert_eq!((admitted.tenant, admitted.role), (lab(), Role::Gateway));
     }
 

@@ -21,6 +21,7 @@ use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::replay::{Minds, Work};
 use crate::store::{CacheCounter, CacheCounts, KeyError, Store};
+use crate::tenancy::Clock;
 use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
@@ -62,6 +63,8 @@ pub struct HouseSettings<D: Domain> {
     /// People awake at once.
     pub awake_max: usize,
     pub failure: Failure,
+    /// What record times and the overlaps of retired keys go by.
+    pub clock: Clock,
 }
 
 /// Why the actors did not start.
@@ -143,8 +146,16 @@ const FALL_DOWN: Duration = Duration::from_millis(200);
 impl House {
     /// Trains the base mind, so that nobody ever waits for it, and starts the actors.
     pub fn start<D: Domain>(settings: HouseSettings<D>) -> Result<House, ActorsError> {
-        let HouseSettings { domain, store, recipe_text, trainers, arbiters, awake_max, failure } =
-            settings;
+        let HouseSettings {
+            domain,
+            store,
+            recipe_text,
+            trainers,
+            arbiters,
+            awake_max,
+            failure,
+            clock,
+        } = settings;
         let recipe = Recipe::parse(&recipe_text)
             .map_err(|error| ActorsError::Recipe { reason: error.to_string() })?;
         let hello = Hello {
@@ -156,7 +167,7 @@ impl House {
         let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
         let minds = Arc::<Minds>::default();
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
-        let book = Book::open(store.clone())?;
+        let book = Book::open_by(store.clone(), clock)?;
         let meters = Arc::new(Meters::new(book.admissions().clone(), store.log.clone()));
         let growths = book.growths().clone();
         let reader = Reader::new(store.log.clone());

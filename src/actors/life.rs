@@ -3,7 +3,6 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use actix::Addr;
 
@@ -136,8 +135,7 @@ impl<D: Domain> Life<D> {
 
     /// The wall clock; a session makes it monotone with `next_at`.
     pub fn now(&self) -> Timestamp {
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Timestamp(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
+        self.registrar.admissions().clock().read()
     }
 
     /// Queues a training.

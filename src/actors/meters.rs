@@ -253,6 +253,7 @@ fn over(quota: Quota, used: u64, limit: u64, retry_after_ms: Option<u32>) -> Quo
 
 #[cfg(test)]
 mod tests {
+    use super::super::wall_clock;
     use super::*;
     use crate::ids::StreamId;
     use crate::session::Query;
@@ -261,7 +262,7 @@ mod tests {
     use crate::tenancy::{Registry, Standing};
 
     fn meters(store: &Store, quotas: Quotas) -> (Arc<Meters>, TenantId) {
-        let (admissions, lab) = (Admissions::default(), TenantId::new("lab").unwrap());
+        let (admissions, lab) = (Admissions::new(wall_clock()), TenantId::new("lab").unwrap());
         admissions.update(&lab, &standing(quotas));
         (Arc::new(Meters::new(admissions, store.log.clone())), lab)
     }

@@ -3,6 +3,7 @@
 mod archive;
 mod awake;
 mod book;
+mod clock;
 mod directory;
 mod failure;
 mod farewell;
@@ -21,6 +22,7 @@ pub use archive::{
     ArchiveAsk, Frame, HeadView, Heads, PlainRecords, PlainView, Reader, SealedRecords, SealedView,
 };
 pub use book::{Book, OrderError, fold as fold_tenant};
+pub use clock::wall_clock;
 pub use failure::{Alarm, Failure};
 pub use growth::{Growth, Growths};
 pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};

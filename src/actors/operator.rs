@@ -59,8 +59,11 @@ pub struct KeyView {
     pub role: Role,
     pub label: String,
     pub admitted_at: Timestamp,
-    /// None while nobody said otherwise.
+    /// When its overlap was to end, once it was retired; none before.
     pub valid_until: Option<Timestamp>,
+    /// It never comes in again: there was no overlap, or a reading of the clock has ended it.
+    #[serde(default)]
+    pub retired: bool,
 }
 
 /// Milliseconds after which an order may be sent again that found too many before it.
@@ -73,7 +76,8 @@ impl TenantView {
             role: known.role,
             label: known.label.clone(),
             admitted_at: known.admitted_at,
-            valid_until: known.valid_until,
+            valid_until: known.retired.map(|retired| retired.until),
+            retired: known.is_gone(),
         });
         TenantView {
             tenant,

@@ -110,6 +110,12 @@ fn count_lines(counts: &Counts, scrutiny: Scrutiny) -> Vec<String> {
         n(counts.episodes, "episode"),
         n(counts.utterances, "utterance")
     )];
+    if counts.held_times > 0 {
+        lines.push(format!(
+            "{} with a held time: the clock read no later than the record before",
+            n(counts.held_times, "record")
+        ));
+    }
     if counts.segments > 0 {
         lines.push(format!("held {} against their records", n(counts.segments, "segment")));
     }

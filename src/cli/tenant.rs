@@ -82,7 +82,7 @@ enum Verb {
         tenant: String,
         #[arg(value_name = "PUBLIC|FILE", allow_hyphen_values = true)]
         public: String,
-        /// It stays good for so long: 90s, 15m, 12h, 7d.
+        /// It stays good for so long: 90s, 15m, 12h, 7d; at most 30d.
         #[arg(long, value_name = "TIME", default_value = "0s", value_parser = overlap::parse)]
         overlap: u64,
         #[command(flatten)]
@@ -95,7 +95,7 @@ enum Verb {
         old: String,
         #[arg(value_name = "NEW|FILE", allow_hyphen_values = true)]
         new: String,
-        /// Both are good for so long: 90s, 15m, 12h, 7d.
+        /// Both are good for so long: 90s, 15m, 12h, 7d; at most 30d.
         #[arg(long, value_name = "TIME", value_parser = overlap::parse)]
         overlap: u64,
         #[command(flatten)]
@@ -181,12 +181,34 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         }
     };
     let tenant = name(&tenant)?;
-    let recorded = place.enter(order == Order::Open)?.obey(&tenant, order)?;
-    match recorded {
-        0 => println!("tenant {tenant}: it was so already"),
-        _ => println!("tenant {tenant}: done"),
-    }
+    let mut office = place.enter(order == Order::Open)?;
+    let retired = match &order {
+        Order::Retire { key, .. } => Some(*key),
+        _ => None,
+    };
+    let said = match (office.obey(&tenant, order)?, retired) {
+        (0, Some(key)) => as_retired(&mut office, &tenant, &key),
+        (0, None) => "it was so already".to_owned(),
+        _ => "done".to_owned(),
+    };
+    println!("tenant {tenant}: {said}");
     Ok(())
+}
+
+/// Why an order to retire a key led to no record.
+fn as_retired(office: &mut Office, tenant: &TenantId, key: &PublicKey) -> String {
+    // None of it, when an operator has retired their own key and may not ask any more.
+    let tenants = office.list(Some(tenant)).unwrap_or_default();
+    let known = tenants.iter().flat_map(|view| &view.keys).find(|known| known.key == *key);
+    let retired_before = match known.map(|known| (known.retired, known.valid_until)) {
+        Some((true, _)) => "the key was retired before and never comes in again".to_owned(),
+        Some((false, Some(until))) => format!(
+            "the key was retired before and comes in until {}, no later than you ask for now",
+            utc(until)
+        ),
+        Some((false, None)) | None => "the key was retired before".to_owned(),
+    };
+    format!("nothing was recorded; {retired_before}")
 }
 
 fn name(text: &str) -> Result<TenantId, Failure> {
@@ -219,9 +241,11 @@ fn show(view: &TenantView) {
         Some(reason) => println!("{tenant}: DISABLED ({reason:?}); {quotas}"),
     }
     for known in keys {
-        let until = match known.valid_until {
-            None => String::new(),
-            Some(until) => format!(" until {}", utc(until)),
+        let until = match (known.retired, known.valid_until) {
+            (_, None) => String::new(),
+            // A jump of the clock may have ended the overlap earlier.
+            (true, Some(until)) => format!(" until {} at most, retired", utc(until)),
+            (false, Some(until)) => format!(" until {}, then retired", utc(until)),
         };
         let (key, role, label) = (show_key(&known.key), known.role, &known.label);
         println!("  {role:<8}  {key}  since {}{until}  {label:?}", utc(known.admitted_at));

@@ -107,7 +107,7 @@ fn readable(verified: &Verified) -> Vec<String> {
         match opened(record) {
             None => lines.push("  its body is sealed and was not revealed".to_owned()),
             Some(Ok(opened)) => {
-                lines.extend(log::readable(&opened).iter().map(|line| format!("  {line}")));
+                lines.extend(log::readable(&opened, false).iter().map(|line| format!("  {line}")));
             }
             Some(Err(reason)) => lines.push(format!("  its body was revealed; {reason}")),
         }

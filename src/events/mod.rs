@@ -14,8 +14,8 @@ pub use event::{
     RetrainScheduled, SessionClosed, SessionOpened,
 };
 pub use receipt::Durable;
-pub use record::{Batch, Head, Header, HeaderError, Record, commitment};
+pub use record::{Batch, Head, Header, HeaderError, Record, Times, commitment};
 pub use tenant::{
-    KeyAdmitted, KeyRetired, PersonErased, Quotas, QuotasSet, Role, SegmentClosed, TenantDisabled,
-    TenantEnabled, TenantEvent, TenantOpened,
+    KeyAdmitted, KeyRetired, Overlap, PersonErased, Quotas, QuotasSet, Role, SegmentClosed,
+    TenantDisabled, TenantEnabled, TenantEvent, TenantOpened,
 };

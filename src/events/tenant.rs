@@ -63,11 +63,26 @@ pub struct KeyAdmitted {
     pub label: String,
 }
 
-/// `key` is good until a moment, which may be the present one, and never again.
+/// `key` is good for an overlap, which may be none, and never again.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyRetired {
     pub key: PublicKey,
-    pub valid_until: Timestamp,
+    #[serde(flatten)]
+    pub overlap: Overlap,
+}
+
+/// How long a retired key stays good.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Overlap {
+    /// From a reading of the wall clock on. The record's own time may be another, a held one.
+    Read {
+        /// What the wall clock read when the key was retired.
+        wall: Timestamp,
+        overlap_seconds: u64,
+    },
+    /// From the time of the record on: version 1 did not say what the wall clock read.
+    Former { valid_until: Timestamp },
 }
 
 /// Nobody comes in as this tenant any more.
@@ -108,6 +123,18 @@ pub struct SegmentClosed {
     pub root: Digest,
     /// The digest of the record `last`.
     pub head: Digest,
+}
+
+impl Overlap {
+    /// The span within which the key stays good: `[from, until)`; empty when there is no overlap.
+    ///
+    /// - `recorded_at`: the time of the record.
+    pub fn span(&self, recorded_at: Timestamp) -> (Timestamp, Timestamp) {
+        match *self {
+            Overlap::Read { wall, overlap_seconds } => (wall, wall.plus_seconds(overlap_seconds)),
+            Overlap::Former { valid_until } => (recorded_at, valid_until),
+        }
+    }
 }
 
 impl Role {

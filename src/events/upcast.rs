@@ -1,10 +1,10 @@
 //! The last step from former bodies, which the museum keeps, to the events of today.
 
-use apprentice_migrations::records::{self, retrain_completed};
+use apprentice_migrations::records::{self, key_retired, retrain_completed};
 
 use super::codec::unpack;
-use super::{DecodeError, Event, EventKind, Report, RetrainCompleted};
-use crate::ids::Digest;
+use super::{DecodeError, Event, EventKind, KeyRetired, Overlap, Report, RetrainCompleted};
+use crate::ids::{Digest, PublicKey, Timestamp};
 
 /// Reads a body of a version that was released and is not written any more; none when there never
 /// was such a version.
@@ -17,6 +17,10 @@ pub(super) fn former(
         (EventKind::RetrainCompleted, 1) => {
             let former: retrain_completed::V1 = unpack(kind, body)?;
             Some(Event::RetrainCompleted(former.into()))
+        }
+        (EventKind::KeyRetired, 1) => {
+            let former: key_retired::V1 = unpack(kind, body)?;
+            Some(KeyRetired::from(former).into())
         }
         _ => None,
     })
@@ -31,6 +35,14 @@ impl From<retrain_completed::V1> for RetrainCompleted {
     }
 }
 
+impl From<key_retired::V1> for KeyRetired {
+    fn from(former: key_retired::V1) -> KeyRetired {
+        let key_retired::V1 { key, valid_until } = former;
+        let overlap = Overlap::Former { valid_until: Timestamp(valid_until) };
+        KeyRetired { key: PublicKey(key.0), overlap }
+    }
+}
+
 fn digest(bytes: records::Digest) -> Digest {
     Digest(bytes.0)
 }
@@ -42,16 +54,32 @@ mod tests {
 
     #[test]
     fn versions_that_never_were_are_unknown_and_former_ones_are_checked_as_todays_are() {
-        let kind = EventKind::RetrainCompleted;
-        let (number, newest) = (kind as u16, kind.version());
-        for version in [0, newest + 1] {
-            let unknown = Err(DecodeError::UnknownVersion { kind, version });
-            assert_eq!(decode(number, version, b"\x80"), unknown);
+        for kind in [EventKind::RetrainCompleted, EventKind::KeyRetired] {
+            let (number, newest) = (kind as u16, kind.version());
+            for version in [0, newest + 1] {
+                let unknown = Err(DecodeError::UnknownVersion { kind, version });
+                assert_eq!(decode(number, version, b"\x80"), unknown);
+            }
+            for version in 1..=newest {
+                for body in [&b"\x80"[..], b"", b"\xff", b"\xc0\xc0"] {
+                    let wrong = decode(number, version, body).unwrap_err();
+                    assert!(matches!(wrong, DecodeError::Body { .. }), "{wrong}");
+                }
+            }
         }
-        for body in [&b"\x80"[..], b"", b"\xff", b"\xc0\xc0"] {
-            let wrong = decode(number, 1, body).unwrap_err();
-            assert!(matches!(wrong, DecodeError::Body { .. }), "{wrong}");
-        }
+    }
+
+    #[test]
+    fn a_retired_key_of_version_1_says_when_its_overlap_ends_and_nothing_of_a_clock() {
+        let overlap = Overlap::Former { valid_until: Timestamp(7) };
+        let event: Event = KeyRetired { key: PublicKey([1; 32]), overlap }.into();
+        // Version 1 wrote this body, and none that is written today is taken for it.
+        assert_eq!(decode(EventKind::KeyRetired as u16, 1, &encode(&event)), Ok(event));
+        let overlap = Overlap::Read { wall: Timestamp(7), overlap_seconds: 0 };
+        let event: Event = KeyRetired { key: PublicKey([1; 32]), overlap }.into();
+        let number = EventKind::KeyRetired as u16;
+        assert_eq!(decode(number, 2, &encode(&event)), Ok(event.clone()));
+        assert!(decode(number, 1, &encode(&event)).is_err());
     }
 
     #[test]

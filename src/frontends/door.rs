@@ -1,6 +1,6 @@
 use super::rights::Caller;
 use super::zap::{DOMAIN, Seal};
-use super::{Context, CurveKey, Endpoint, GatewayError, clock, lock};
+use super::{Context, CurveKey, Endpoint, GatewayError, lock};
 use crate::ids::PublicKey;
 use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX};
 use crate::tenancy::Admissions;
@@ -121,7 +121,7 @@ impl Door {
         match frame.gets(USER_ID).and_then(|user_id| seal.key_of(user_id)) {
             None => Sender::Unvouched,
             // Asked for each message: a key that is taken back ends with its next one.
-            Some(key) => match admissions.admit(&key, clock::now()) {
+            Some(key) => match admissions.admit(&key) {
                 Some(admitted) => Sender::Known(Caller::Keyed(admitted)),
                 None => Sender::NotAdmitted(key),
             },
@@ -145,6 +145,7 @@ const GIVEN_ID_BYTES: usize = 5;
 mod tests {
     use super::super::client::Identity;
     use super::*;
+    use crate::actors::wall_clock;
 
     fn receive(door: &Door) -> Incoming {
         assert_eq!(door.socket.poll(zmq::POLLIN, 10_000).unwrap(), 1, "a message within 10 s");
@@ -155,7 +156,7 @@ mod tests {
     #[test]
     fn a_message_whose_handshake_nobody_answered_is_vouched_for_by_nobody() {
         let (context, key) = (Context::new(), CurveKey::new().unwrap());
-        let admissions = Admissions::default();
+        let admissions = Admissions::new(wall_clock());
         let keyed = Keyed { key: &key, admissions, seal: Seal::fresh() };
         let door = Door::new(&context, Some(keyed)).unwrap();
         let endpoint = Endpoint::parse("tcp://127.0.0.1:0").unwrap();

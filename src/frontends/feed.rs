@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::outbox::{Inbox, Outbox};
 use super::zap::Gate;
-use super::{Context, CurveKey, Endpoint, GatewayError, clock, lock, rights, wire};
+use super::{Context, CurveKey, Endpoint, GatewayError, lock, rights, wire};
 use crate::actors::{Failure, FeedView, Growth, Growths, PlainView, Reader, SealedView};
 use crate::ids::{PublicKey, RequestId, Seq, TenantId};
 use crate::tenancy::Admissions;
@@ -259,11 +259,12 @@ impl Press {
     /// new ones when somebody who could have come in may not any more.
     fn tend(&mut self, tenant: &TenantId) {
         let Some(standing) = self.admissions.standing(tenant) else { return };
-        let now = clock::now();
+        // Read after the register: see `Admissions`.
+        let wall = self.admissions.clock().read();
         let may_follow =
             standing.keys().iter().filter(|(_, key)| rights::SEALED.contains(&key.role));
         let (admitted, ended): (BTreeSet<PublicKey>, BTreeSet<PublicKey>) =
-            may_follow.map(|(key, _)| *key).partition(|key| standing.admits(key, now).is_some());
+            may_follow.map(|(key, _)| *key).partition(|key| standing.admits(key, wall).is_some());
         if admitted.is_empty() && !self.stands.contains_key(tenant) {
             return;
         }

@@ -2,7 +2,6 @@
 //! described for strangers in `schema/wire.md`.
 
 mod client;
-mod clock;
 mod counters;
 mod curve_keys;
 mod door;

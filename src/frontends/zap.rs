@@ -244,7 +244,7 @@ impl<W: Fn()> Desk<W> {
         };
         let denied = ("400", "not admitted");
         let key = PublicKey(key.as_slice().try_into().map_err(|_| denied)?);
-        match self.admissions.admit(&key, super::clock::now()) {
+        match self.admissions.admit(&key) {
             Some(admitted) if gate.lets_in(&admitted) => Ok(key),
             _ => Err(denied),
         }
@@ -254,12 +254,13 @@ impl<W: Fn()> Desk<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::actors::wall_clock;
     use crate::tenancy::Role;
 
     /// A doorkeeper, and a socket that asks it what ZeroMQ asks.
     fn desk() -> (Doorkeeper, zmq::Socket, Failure) {
         let (context, failure) = (Context::new(), Failure::default());
-        let (admissions, counters) = (Admissions::default(), Arc::default());
+        let (admissions, counters) = (Admissions::new(wall_clock()), Arc::default());
         let keeper = Doorkeeper::start(
             &context,
             Seal::fresh(),

@@ -56,6 +56,8 @@ pub struct Counts {
     pub records: u64,
     pub episodes: u64,
     pub utterances: u64,
+    /// Records whose time was held, so that it is not what the wall clock read.
+    pub held_times: u64,
     /// Closed segments that were held against their records.
     pub segments: u64,
     /// Commands that were decided again, utterances among them.
@@ -81,6 +83,7 @@ impl Counts {
             records,
             episodes,
             utterances,
+            held_times,
             segments,
             reproposed,
             reproposed_utterances,
@@ -96,6 +99,7 @@ impl Counts {
         self.records += records;
         self.episodes += episodes;
         self.utterances += utterances;
+        self.held_times += held_times;
         self.segments += segments;
         self.reproposed += reproposed;
         self.reproposed_utterances += reproposed_utterances;

@@ -8,7 +8,7 @@ use super::audit::{Counts, Progress, Scrutiny, StreamReport};
 use super::evidence::{SegmentError, check_segment, newest_checkpoint};
 use super::origins::mind_origin;
 use super::{Difference, erasures, repropose};
-use crate::events::{Event, Record, Report, RetrainCompleted, SegmentClosed, TenantEvent};
+use crate::events::{Event, Record, Report, RetrainCompleted, SegmentClosed, TenantEvent, Times};
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
@@ -49,6 +49,7 @@ pub(super) struct Auditor<'a, D: Domain> {
     bases: &'a BaseMinds,
     session: Session<D>,
     counts: Counts,
+    times: Times,
     first: Option<Difference>,
     /// The record that named the present mind.
     named_at: u64,
@@ -74,6 +75,7 @@ impl<'a, D: Domain> Auditor<'a, D> {
             bases,
             session: Session::new(domain.clone()),
             counts: Counts { streams: 1, ..Counts::default() },
+            times: Times::default(),
             first: None,
             named_at: 0,
             trained: None,
@@ -140,6 +142,7 @@ impl<'a, D: Domain> Auditor<'a, D> {
         for record in records.map_err(|error| failed(&error, 1))? {
             let record = record.map_err(|error| failed(&error, registry.head().seq + 1))?;
             self.counts.records += 1;
+            self.counts.held_times += u64::from(self.times.is_held(&record));
             registry.apply(&record).map_err(|error| {
                 Difference::new(error.seq.get(), "place in history", "what is there", error.reason)
             })?;
@@ -242,6 +245,7 @@ impl<'a, D: Domain> Auditor<'a, D> {
         }
         for record in batch.drain(..) {
             self.count(&record.event);
+            self.counts.held_times += u64::from(self.times.is_held(&record));
             if self.scrutiny.retrain {
                 self.retrain(&record);
             }

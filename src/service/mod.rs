@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::actors::{
     ActorsError, Erased, Failure, House, HouseSettings, OrderError, Registrar, Usage, Wakings,
+    wall_clock,
 };
 use crate::frontends::{
     Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
@@ -18,6 +19,7 @@ use crate::ids::{PublicKey, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::limits::{AWAKE_USERS_MAX, FEED_WAITING_MAX};
 use crate::store::{self, FaultPlan};
+use crate::tenancy::Clock;
 use crate::world::Domain;
 
 /// What a service is made of.
@@ -47,6 +49,8 @@ pub struct Config<D: Domain> {
     pub awake_max: usize,
     /// Faults on purpose, for drills; none in a normal service.
     pub faults: Option<FaultPlan>,
+    /// The machine's wall clock, unless a test sets another.
+    pub clock: Clock,
 }
 
 /// Where a service keeps what it records.
@@ -113,6 +117,7 @@ impl<D: Domain> Config<D> {
             trainers: cores(),
             awake_max: AWAKE_USERS_MAX,
             faults: None,
+            clock: wall_clock(),
         }
     }
 }
@@ -159,6 +164,7 @@ impl Service {
             arbiters: cores(),
             awake_max: config.awake_max,
             failure: failure.clone(),
+            clock: config.clock,
         })?;
         let context = Context::new();
         let waiting_max = config.feed_waiting_max;

@@ -167,9 +167,9 @@ impl<D: Domain> Session<D> {
         self.state.opened.is_some()
     }
 
-    /// The time of the next record: the wall clock, but never before the last record.
+    /// The time of the next record: the wall clock, but after the last record.
     pub fn next_at(&self, wall: Timestamp) -> Timestamp {
-        Timestamp(wall.0.max(self.state.last_at.0 + 1))
+        self.state.last_at.next(wall)
     }
 
     /// Whether the recorded recipe is one that this binary can read; a newer one may have written

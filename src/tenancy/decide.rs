@@ -1,10 +1,10 @@
 use super::{Order, Registry};
 use crate::events::{
-    Event, KeyAdmitted, KeyRetired, PersonErased, QuotasSet, Role, TenantDisabled, TenantEnabled,
-    TenantOpened,
+    Event, KeyAdmitted, KeyRetired, Overlap, PersonErased, QuotasSet, Role, TenantDisabled,
+    TenantEnabled, TenantEvent, TenantOpened,
 };
 use crate::ids::{PublicKey, Seq, StreamKey, Timestamp};
-use crate::limits::{LABEL_BYTES_MAX, TENANT_KEYS_MAX};
+use crate::limits::{LABEL_BYTES_MAX, OVERLAP_S_MAX, TENANT_KEYS_MAX};
 
 /// Why an order is not carried out. Nothing was recorded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -19,6 +19,11 @@ pub enum Refusal {
     UnknownKey { key: PublicKey },
     #[error("a key cannot be replaced by itself: {key}")]
     SameKey { key: PublicKey },
+    #[error(
+        "an overlap has at most {max} seconds ({} days), this one has {found}; give a shorter one",
+        max / 86_400
+    )]
+    TooLongOverlap { max: u64, found: u64 },
     #[error("a tenant has at most {max} keys; retired ones count, because they are remembered")]
     TooManyKeys { max: usize },
     #[error("a {what} has at most {max} bytes, this one has {found}")]
@@ -33,9 +38,10 @@ pub enum Refusal {
 
 /// What an order leads to: the events to be appended together; none when it is so already.
 ///
-/// - `now`: the moment of the record; validity of keys counts from it.
+/// - `wall`: what the wall clock reads; overlaps count from it. The time of the record is
+///   [`Registry::next_at`] of it.
 /// - errors: [`Refusal`].
-pub fn decide(registry: &Registry, order: &Order, now: Timestamp) -> Result<Vec<Event>, Refusal> {
+pub fn decide(registry: &Registry, order: &Order, wall: Timestamp) -> Result<Vec<Event>, Refusal> {
     let inside = matches!(order, Order::NoteErasure { .. } | Order::CloseSegment(_));
     let mut events: Vec<Event> = Vec::new();
     if !registry.is_open() {
@@ -47,10 +53,10 @@ pub fn decide(registry: &Registry, order: &Order, now: Timestamp) -> Result<Vec<
     }
     events.extend(match order {
         Order::Open => vec![],
-        Order::Admit { key, role, label } => admit(registry, *key, *role, label, now)?,
-        Order::Retire { key, overlap_seconds } => retire(registry, *key, *overlap_seconds, now)?,
+        Order::Admit { key, role, label } => admit(registry, *key, *role, label, wall)?,
+        Order::Retire { key, overlap_seconds } => retire(registry, *key, *overlap_seconds, wall)?,
         Order::Rotate { old, new, overlap_seconds } => {
-            rotate(registry, *old, *new, *overlap_seconds, now)?
+            rotate(registry, *old, *new, *overlap_seconds, wall)?
         }
         Order::Disable { reason } => {
             within("reason", LABEL_BYTES_MAX, reason)?;
@@ -95,7 +101,27 @@ pub fn decide(registry: &Registry, order: &Order, now: Timestamp) -> Result<Vec<
             }
         }
     });
+    if !events.is_empty() {
+        events.extend(ended_meanwhile(registry, &events, wall));
+    }
     Ok(events)
+}
+
+/// Where the time of the next record is held, it does not tell what the wall clock reads. If that
+/// ends an overlap, a record says so: after a restart the key must not come back. One is enough:
+/// its reading ends all overlaps that it ends.
+fn ended_meanwhile(registry: &Registry, events: &[Event], wall: Timestamp) -> Option<Event> {
+    let told = |event: &Event| matches!(event, Event::Tenant(TenantEvent::KeyRetired(_)));
+    if !registry.holds(wall) || events.iter().any(told) {
+        return None;
+    }
+    let mut keys = registry.standing().keys().iter();
+    let (key, _) = keys.find(|(_, known)| !known.is_gone() && !known.is_good(wall))?;
+    Some(retired(*key, wall, 0))
+}
+
+fn retired(key: PublicKey, wall: Timestamp, overlap_seconds: u64) -> Event {
+    KeyRetired { key, overlap: Overlap::Read { wall, overlap_seconds } }.into()
 }
 
 fn admit(
@@ -103,11 +129,11 @@ fn admit(
     key: PublicKey,
     role: Role,
     label: &str,
-    now: Timestamp,
+    wall: Timestamp,
 ) -> Result<Vec<Event>, Refusal> {
     within("label", LABEL_BYTES_MAX, label)?;
     match registry.standing().keys().get(&key) {
-        Some(known) if !known.is_good(now) => Err(Refusal::Retired { key }),
+        Some(known) if !known.is_good(wall) => Err(Refusal::Retired { key }),
         Some(known) if known.role != role => {
             Err(Refusal::OtherRole { key, held: known.role, wanted: role })
         }
@@ -123,15 +149,20 @@ fn retire(
     registry: &Registry,
     key: PublicKey,
     overlap_seconds: u64,
-    now: Timestamp,
+    wall: Timestamp,
 ) -> Result<Vec<Event>, Refusal> {
     let known = registry.standing().keys().get(&key).ok_or(Refusal::UnknownKey { key })?;
-    let until = Timestamp(now.0.saturating_add(overlap_seconds.saturating_mul(1_000_000)));
-    match known.valid_until {
-        // An earlier end stands: a key that is gone does not come back.
-        Some(earlier) if earlier <= until => Ok(vec![]),
-        _ => Ok(vec![KeyRetired { key, valid_until: until }.into()]),
+    if overlap_seconds > OVERLAP_S_MAX {
+        return Err(Refusal::TooLongOverlap { max: OVERLAP_S_MAX, found: overlap_seconds });
     }
+    Ok(match known.retired {
+        Some(_) if known.is_gone() => vec![],
+        // Its overlap is over, and no record says so yet.
+        Some(_) if !known.is_good(wall) => vec![retired(key, wall, 0)],
+        // An earlier end stands.
+        Some(running) if running.until <= wall.plus_seconds(overlap_seconds) => vec![],
+        _ => vec![retired(key, wall, overlap_seconds)],
+    })
 }
 
 fn rotate(
@@ -139,21 +170,21 @@ fn rotate(
     old: PublicKey,
     new: PublicKey,
     overlap_seconds: u64,
-    now: Timestamp,
+    wall: Timestamp,
 ) -> Result<Vec<Event>, Refusal> {
     if old == new {
         return Err(Refusal::SameKey { key: old });
     }
     let known = registry.standing().keys().get(&old).ok_or(Refusal::UnknownKey { key: old })?;
-    if !known.is_good(now) {
+    if !known.is_good(wall) {
         // Asked again after the overlap, it is done already; else somebody wants a gone key's place.
         return match registry.standing().keys().get(&new) {
-            Some(successor) if successor.role == known.role && successor.is_good(now) => Ok(vec![]),
+            Some(heir) if heir.role == known.role && heir.is_good(wall) => Ok(vec![]),
             _ => Err(Refusal::Retired { key: old }),
         };
     }
-    let mut events = admit(registry, new, known.role, &known.label, now)?;
-    events.extend(retire(registry, old, overlap_seconds, now)?);
+    let mut events = admit(registry, new, known.role, &known.label, wall)?;
+    events.extend(retire(registry, old, overlap_seconds, wall)?);
     Ok(events)
 }
 
@@ -178,14 +209,15 @@ mod tests {
     use crate::ids::{Digest, RequestId};
 
     /// Decides and applies, as a book does.
-    fn obey(registry: &mut Registry, order: Order, now: u64) -> Result<usize, Refusal> {
-        let events = decide(registry, &order, Timestamp(now))?;
-        let count = events.len();
+    fn obey(registry: &mut Registry, order: Order, wall: u64) -> Result<usize, Refusal> {
+        let wall = Timestamp(wall);
+        let events = decide(registry, &order, wall)?;
+        let (count, at) = (events.len(), registry.next_at(wall));
         for event in events {
             let seq = registry.head().next();
             let record = Record {
                 seq,
-                at: Timestamp(now),
+                at,
                 request: RequestId([0; 16]),
                 prev: registry.head().digest,
                 digest: Digest::of(&seq.get().to_be_bytes()),

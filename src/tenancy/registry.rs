@@ -1,6 +1,8 @@
 use std::collections::BTreeMap;
 
-use crate::events::{Event, Head, PersonErased, Quotas, Record, Role, SegmentClosed, TenantEvent};
+use crate::events::{
+    Event, Head, Overlap, PersonErased, Quotas, Record, Role, SegmentClosed, TenantEvent,
+};
 use crate::ids::{PublicKey, Seq, StreamKey, Timestamp, WithinTenant};
 
 /// A tenant's stream, folded.
@@ -21,6 +23,7 @@ pub struct Standing {
     disabled: Option<String>,
     keys: BTreeMap<PublicKey, Key>,
     quotas: Quotas,
+    running: Running,
 }
 
 /// A key that was ever admitted.
@@ -30,7 +33,25 @@ pub struct Key {
     pub label: String,
     pub admitted_at: Timestamp,
     /// None while nobody said otherwise.
-    pub valid_until: Option<Timestamp>,
+    pub retired: Option<Retired>,
+}
+
+/// A key that was taken back. It is good while its overlap runs: as long as the wall clock reads
+/// `from` or later, and earlier than `until`. The overlap ends for ever with the first reading that
+/// is not; no later reading brings the key back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Retired {
+    pub from: Timestamp,
+    pub until: Timestamp,
+    /// A reading has ended the overlap, or there was none.
+    pub ended: bool,
+}
+
+/// The readings of the wall clock that end no overlap of a tenant's keys: `[from, until)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Running {
+    from: Timestamp,
+    until: Timestamp,
 }
 
 /// A leaf of the tenant's tree, and the record that made it one.
@@ -79,6 +100,11 @@ impl Registry {
         if matches!(event, TenantEvent::Opened(_)) == self.opened {
             return wrong("a tenant is opened once, and first".to_owned());
         }
+        // A held time is no reading of a clock. (The other records of a batch have the time of its
+        // first one, which was observed.)
+        if !record.at.is_held(self.last_at) {
+            self.standing.observe(record.at);
+        }
         match event {
             TenantEvent::Opened(_) => self.opened = true,
             TenantEvent::KeyAdmitted(event) => {
@@ -86,14 +112,18 @@ impl Registry {
                     role: event.role,
                     label: event.label.clone(),
                     admitted_at: record.at,
-                    valid_until: None,
+                    retired: None,
                 };
                 self.standing.keys.insert(event.key, key);
             }
-            TenantEvent::KeyRetired(event) => match self.standing.keys.get_mut(&event.key) {
-                Some(key) => key.valid_until = Some(event.valid_until),
-                None => return wrong(format!("key {} was never admitted", event.key)),
-            },
+            TenantEvent::KeyRetired(event) => {
+                if let Overlap::Read { wall, .. } = event.overlap {
+                    self.standing.observe(wall);
+                }
+                if !self.standing.retire(&event.key, event.overlap.span(record.at)) {
+                    return wrong(format!("key {} was never admitted", event.key));
+                }
+            }
             TenantEvent::Disabled(event) => self.standing.disabled = Some(event.reason.clone()),
             TenantEvent::Enabled(_) => self.standing.disabled = None,
             TenantEvent::QuotasSet(event) => self.standing.quotas = event.quotas,
@@ -131,9 +161,14 @@ impl Registry {
         self.head
     }
 
-    /// A moment for the next record: never before the last one.
-    pub fn next_at(&self, clock: Timestamp) -> Timestamp {
-        clock.max(self.last_at)
+    /// A time for the next record: the wall clock, but after the last record.
+    pub fn next_at(&self, wall: Timestamp) -> Timestamp {
+        self.last_at.next(wall)
+    }
+
+    /// Whether the time of the next record is held, so that it does not tell what the clock read.
+    pub fn holds(&self, wall: Timestamp) -> bool {
+        self.next_at(wall).is_held(self.last_at)
     }
 
     /// Everybody who was erased, by their stream.
@@ -153,9 +188,9 @@ impl Registry {
 }
 
 impl Standing {
-    /// What `key` may do at `now`.
-    pub fn admits(&self, key: &PublicKey, now: Timestamp) -> Option<Role> {
-        let known = self.keys.get(key).filter(|known| known.is_good(now))?;
+    /// What `key` may do when the wall clock reads `wall`.
+    pub fn admits(&self, key: &PublicKey, wall: Timestamp) -> Option<Role> {
+        let known = self.keys.get(key).filter(|known| known.is_good(wall))?;
         self.disabled.is_none().then_some(known.role)
     }
 
@@ -172,10 +207,76 @@ impl Standing {
     pub fn quotas(&self) -> &Quotas {
         &self.quotas
     }
+
+    /// Whether a reading of the wall clock ends an overlap that still ran.
+    pub fn is_news(&self, wall: Timestamp) -> bool {
+        wall < self.running.from || wall >= self.running.until
+    }
+
+    /// Ends the overlaps that a reading of the wall clock ends, for ever.
+    pub fn observe(&mut self, wall: Timestamp) {
+        if self.is_news(wall) {
+            for key in self.keys.values_mut() {
+                let good = key.is_good(wall);
+                if let Some(retired) = &mut key.retired {
+                    retired.ended |= !good;
+                }
+            }
+            self.running = Running::of(&self.keys);
+        }
+    }
+
+    /// Ends the overlaps that have ended in `before`, of the same tenant.
+    pub(super) fn keep_ended(&mut self, before: &Standing) {
+        for (key, known) in &mut self.keys {
+            let ended = before.keys.get(key).is_some_and(Key::is_gone);
+            if let Some(retired) = &mut known.retired {
+                retired.ended |= ended;
+            }
+        }
+        self.running = Running::of(&self.keys);
+    }
+
+    /// An earlier end stands: a key that is gone does not come back.
+    ///
+    /// - `span`: see [`Retired`].
+    /// - returns: whether there is such a key.
+    fn retire(&mut self, key: &PublicKey, (from, until): (Timestamp, Timestamp)) -> bool {
+        let Some(known) = self.keys.get_mut(key) else { return false };
+        match known.retired {
+            Some(retired) if retired.ended || retired.until <= until => {}
+            _ => known.retired = Some(Retired { from, until, ended: until <= from }),
+        }
+        self.running = Running::of(&self.keys);
+        true
+    }
+}
+
+impl Default for Running {
+    fn default() -> Running {
+        Running { from: Timestamp(0), until: Timestamp(u64::MAX) }
+    }
+}
+
+impl Running {
+    fn of(keys: &BTreeMap<PublicKey, Key>) -> Running {
+        let running = keys.values().filter_map(|key| key.retired).filter(|it| !it.ended);
+        running.fold(Running::default(), |all, it| Running {
+            from: all.from.max(it.from),
+            until: all.until.min(it.until),
+        })
+    }
 }
 
 impl Key {
-    pub fn is_good(&self, now: Timestamp) -> bool {
-        self.valid_until.is_none_or(|until| now < until)
+    /// Whether it comes in when the wall clock reads `wall`.
+    pub fn is_good(&self, wall: Timestamp) -> bool {
+        let runs = |it: Retired| !it.ended && it.from <= wall && wall < it.until;
+        self.retired.is_none_or(runs)
+    }
+
+    /// Whether it never comes in again, whatever the wall clock reads.
+    pub fn is_gone(&self) -> bool {
+        self.retired.is_some_and(|retired| retired.ended)
     }
 }

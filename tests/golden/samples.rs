@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use apprentice::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
-    Interpreted, KeyAdmitted, KeyRetired, LessonForgotten, PersonErased, Quotas, QuotasSet, Report,
-    RetrainCompleted, RetrainFailed, RetrainScheduled, Role, SegmentClosed, SessionClosed,
-    SessionOpened, TenantDisabled, TenantEnabled, TenantOpened,
+    Interpreted, KeyAdmitted, KeyRetired, LessonForgotten, Overlap, PersonErased, Quotas,
+    QuotasSet, Report, RetrainCompleted, RetrainFailed, RetrainScheduled, Role, SegmentClosed,
+    SessionClosed, SessionOpened, TenantDisabled, TenantEnabled, TenantOpened,
 };
 use apprentice::ids::{Digest, PublicKey, Seq, Signature, StreamKey, Timestamp, UserId};
 use apprentice::language::{
@@ -115,7 +115,14 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("key_admitted.role", "gateway, operator or auditor"),
     ("key_admitted.label", "for people: whose machine it is on"),
     ("key_retired.key", "a key that was admitted before"),
-    ("key_retired.valid_until", "from this moment on it is refused; µs since the epoch"),
+    (
+        "key_retired.overlap_seconds",
+        "seconds that it stays good after that reading; at most 30 days",
+    ),
+    (
+        "key_retired.wall",
+        "what the wall clock read, which a held record time is not; µs since the epoch",
+    ),
     ("tenant_disabled.reason", "why nobody comes in any more"),
     ("quotas_set.quotas.awake_users", "people awake at once; null: no limit but the machine's"),
     ("quotas_set.quotas.in_flight", "requests taken and not yet answered"),
@@ -276,7 +283,11 @@ fn key_admitted() -> KeyAdmitted {
 }
 
 fn key_retired() -> KeyRetired {
-    KeyRetired { key: PublicKey([1; 32]), valid_until: Timestamp(1_700_000_000_000_000) }
+    let wall = Timestamp(1_700_000_000_000_000);
+    KeyRetired {
+        key: PublicKey([1; 32]),
+        overlap: Overlap::Read { wall, overlap_seconds: 604_800 },
+    }
 }
 
 fn quotas() -> Quotas {

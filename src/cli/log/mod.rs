@@ -10,6 +10,7 @@ use clap::{Args, Subcommand};
 
 use super::failure::Failure;
 use super::past::{OfOne, Whose};
+use crate::events::Times;
 use crate::ids::Seq;
 
 /// Read what was recorded.
@@ -18,6 +19,9 @@ use crate::ids::Seq;
 Examples:
   apprentice log show --user you
   apprentice log show --data lab --user ada --json | jq .event.goal
+
+A time is held where the wall clock read no later than the record before it: times never run backwards,
+and the line below such a time says so.
 
 Exit codes: 1 a record cannot be read (those before it are printed), 2 the directory cannot be used
 or has no such person.")]
@@ -50,11 +54,12 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 fn show(arguments: Show) -> Result<(), Failure> {
     let OfOne { past, stream, .. } = arguments.whose.open()?;
     let mut stdout = std::io::stdout().lock();
+    let mut times = Times::default();
     for record in past.store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)? {
         let record = record.map_err(Failure::failed)?;
         let lines = match arguments.json {
             true => vec![show::json(&record).to_string()],
-            false => show::readable(&record),
+            false => show::readable(&record, times.is_held(&record)),
         };
         for line in lines {
             writeln!(stdout, "{line}").map_err(|error| {

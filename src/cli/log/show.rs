@@ -1,6 +1,6 @@
 use serde_json::{Value, json};
 
-use crate::events::{Ending, Event, Record, TenantEvent};
+use crate::events::{Ending, Event, Overlap, Record, TenantEvent};
 use crate::ids::Timestamp;
 use crate::language::Outcome;
 use crate::replay;
@@ -12,12 +12,20 @@ pub fn json(record: &Record) -> Value {
     json!({ "seq": record.seq.get(), "kind": kind, "event": replay::body(&record.event) })
 }
 
+/// Below a time that was held.
+const HELD: &str = "time held: the clock read no later than the record before";
+
 /// One record for a person: number, time (UTC), kind, and what it says.
-pub fn readable(record: &Record) -> Vec<String> {
+///
+/// - `held`: its time is not what the wall clock read ([`crate::events::Times`]).
+pub fn readable(record: &Record, held: bool) -> Vec<String> {
     let (first, more) = sentences(&record.event);
     let kind = format!("{:?}", record.event.kind());
     let mut lines = vec![format!("{:>5}  {}  {kind:<21}  {first}", record.seq, utc(record.at))];
-    // Under the column of the sentences.
+    // Under the columns of the times and of the sentences.
+    if held {
+        lines.push(format!("{:5}  {HELD}", ""));
+    }
     lines.extend(more.into_iter().map(|line| format!("{:51}  {line}", "")));
     lines
 }
@@ -98,7 +106,19 @@ fn tenants(event: &TenantEvent) -> String {
             format!("{role} {} {:?}", event.key, event.label)
         }
         TenantEvent::KeyRetired(event) => {
-            format!("{}, good until {}", event.key, utc(event.valid_until))
+            let (key, overlap) = (event.key, event.overlap);
+            match overlap {
+                Overlap::Read { wall, overlap_seconds: 0 } => {
+                    format!("{key}, for good; the clock read {}", utc(wall))
+                }
+                Overlap::Read { wall, overlap_seconds } => {
+                    let wall = utc(wall);
+                    format!("{key}, good for {overlap_seconds} s more; the clock read {wall}")
+                }
+                Overlap::Former { valid_until } => {
+                    format!("{key}, good until {}", utc(valid_until))
+                }
+            }
         }
         TenantEvent::Disabled(event) => event.reason.clone(),
         TenantEvent::QuotasSet(event) => event.quotas.to_string(),

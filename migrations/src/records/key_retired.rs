@@ -1,0 +1,15 @@
+//! `key_retired`, kind 14.
+
+use serde::Deserialize;
+
+use super::Digest;
+
+/// Version 1, written by builds of 0.2 before its release: the end of the overlap alone. It was
+/// counted from the time of the record, which is no reading of the wall clock where it was held.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct V1 {
+    /// The public half of a CURVE key: 32 bytes, as a digest has.
+    pub key: Digest,
+    /// Microseconds since 1970-01-01T00:00Z.
+    pub valid_until: u64,
+}
