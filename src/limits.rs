@@ -51,6 +51,8 @@ pub const CLIENT_RETRY_S_MAX: u64 = 60;
 /// syncs, and a page holds up to 20 values: values of 8 kB do become blobs (a test of `store/`
 /// shows it), values of 4 kB cannot. Anything larger is chunked.
 pub const STORE_VALUE_BYTES_MAX: usize = 4 * 1024;
+/// Bytes that a stream's key file counts as in its lab's quota: a file takes a block of this size.
+pub const KEY_FILE_BYTES: u64 = 4 * 1024;
 /// Bytes of one record's body before sealing.
 pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
 /// Events of one batch: one command's worth.
