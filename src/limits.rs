@@ -51,6 +51,8 @@ pub const CLIENT_RETRY_S_MAX: u64 = 60;
 /// syncs, and a page holds up to 20 values: values of 8 kB do become blobs (a test of `store/`
 /// shows it), values of 4 kB cannot. Anything larger is chunked.
 pub const STORE_VALUE_BYTES_MAX: usize = 4 * 1024;
+/// Bytes that a stream's key file counts as in its lab's quota: a file takes a block of this size.
+pub const KEY_FILE_BYTES: u64 = 4 * 1024;
 /// Bytes of one record's body before sealing.
 pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
 /// Events of one batch: one command's worth.
@@ -106,6 +108,38 @@ pub const DIRECTORY_QUEUE_MAX: usize = 2 * GATEWAY_IN_FLIGHT_MAX;
 pub const GROWTHS_WAITING_MAX: usize = 4_096;
 /// Messages of the feed that wait for one subscriber; then it misses some, and fetches them.
 pub const FEED_WAITING_MAX: i32 = 512;
+/// Bytes of answers of one tenant alone that wait to leave the process; several tenants together
+/// have less than twice as many. What finds no room is dropped and counted, and asked for again.
+pub const UNSENT_BYTES_MAX: usize = 8 * 1024 * 1024;
+/// Bytes of answers that wait to leave the process for one connection; the first is always taken
+/// that its tenant has room for.
+pub const UNSENT_CONNECTION_BYTES_MAX: usize = 2 * 1024 * 1024;
+/// Bytes of the feed of one tenant alone that wait to leave the process, as [`UNSENT_BYTES_MAX`];
+/// what finds no room is left out, and followers fetch it.
+pub const FEED_UNSENT_BYTES_MAX: usize = 8 * 1024 * 1024;
+/// Bytes of requests of one tenant alone that actors have; then an honest `Busy`.
+pub const IN_HAND_BYTES_MAX: usize = 8 * 1024 * 1024;
+/// Messages of one connection that wait to be read by the gateway; then its sender waits.
+pub const UNREAD_MAX: i32 = 16;
+/// Seconds after which a network connection is cut that takes nothing of what is sent to it.
+pub const UNREAD_S_MAX: u32 = 30;
+/// Bytes of the kernel's buffer for what is sent to one network connection.
+pub const SEND_BUFFER_BYTES: i32 = 256 * 1024;
+/// Connections of one key at the door with keys.
+pub const KEY_CONNECTIONS_MAX: usize = 64;
+/// Connections of one tenant alone at the door with keys; several tenants together have less than
+/// twice as many. Each may hold one frame beyond [`UNSENT_BYTES_MAX`]: the one being encrypted.
+pub const DOOR_CONNECTIONS_MAX: usize = 128;
+/// Connections of one key at the feed.
+pub const KEY_FOLLOWERS_MAX: usize = 8;
+/// Connections of one tenant alone at the feed, as [`DOOR_CONNECTIONS_MAX`].
+pub const FEED_CONNECTIONS_MAX: usize = 32;
+/// Topics that one key subscribes to; it is then cut off. `libzmq` keeps about 2 kB for each.
+pub const TOPICS_MAX: usize = 1_024;
+/// The same for topics that the feed never publishes: they can be long.
+pub const FOREIGN_TOPICS_MAX: usize = 16;
+/// Seconds for which a key is kept from the feed that subscribed to too much.
+pub const CUT_OFF_S: u64 = 600;
 /// Questions about the log that wait, of one tenant alone; then an honest `Busy`.
 pub const ARCHIVE_QUEUE_MAX: usize = 64;
 /// Heads of streams in one answer.
@@ -128,4 +162,9 @@ const _: () = {
     assert!(2 * COMMIT_S_MAX < CLIENT_RETRY_S_MAX);
     assert!(WAITERS_MAX < MAILBOX_MAX);
     assert!(PROGRAM_STEPS_MAX <= EPISODE_ACTIONS_MAX);
+    assert!(2 * FRAME_BYTES_MAX <= UNSENT_CONNECTION_BYTES_MAX);
+    assert!(RECORD_BYTES_MAX + RECORDS_IN_REPLY_BYTES < UNSENT_BYTES_MAX);
+    assert!(RECORD_BYTES_MAX < FEED_UNSENT_BYTES_MAX);
+    assert!(FRAME_BYTES_MAX < IN_HAND_BYTES_MAX);
+    assert!((UNREAD_S_MAX as u64) < CLIENT_RETRY_S_MAX);
 };

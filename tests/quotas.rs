@@ -15,6 +15,7 @@ use apprentice::actors::{
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
 use apprentice::learning::Recipe;
+use apprentice::limits::KEY_FILE_BYTES;
 use apprentice::service::{Data, Service};
 use apprentice::session::{Command, OnClash, Phase, Query};
 use apprentice::store::{self, Store};
@@ -301,4 +302,116 @@ fn bytes_in_the_log_are_counted_over_a_restart_and_can_be_allowed_again() {
     ada.start(stage()).unwrap();
     ada.close("the study is over").unwrap();
     second.stop().unwrap();
+}
+
+/// What a lab has: bytes as its quota counts them, files of its people's keys, and streams.
+fn holdings(store: &Store, tenant: &TenantId) -> (u64, usize) {
+    (store.log.sealed_bytes(tenant).unwrap(), store.log.streams(tenant).unwrap().len())
+}
+
+#[test]
+fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
+    let store = store::open_memory();
+    let house = house(store.clone(), None);
+    let lab = lab("lab");
+    allow(&house, &[(&lab, Quotas::default())]);
+    let (front, before) = (house.front(), holdings(&store, &lab));
+    let wait = Ask::Wait { seconds: 1 };
+    for number in 0..50 {
+        for asked in [STATUS, Ask::Query(Query::Known), Ask::Query(Query::Look), wait.clone()] {
+            match ask(&front, &lab, number, fresh_id(), asked) {
+                Response::Status(status) => {
+                    assert_eq!((status.phase, status.seq, status.episodes), (Phase::Idle, 0, 0));
+                    assert_eq!((&*status.recipe, status.lessons), ("tiny", 0));
+                }
+                Response::Known(known) => assert!(!known.is_empty(), "what everybody starts with"),
+                Response::Rejected(rejected) => {
+                    assert!(rejected.message.contains("nothing to see"))
+                }
+                Response::Waited(waited) => assert_eq!(waited.status.seq, 0),
+                other => panic!("{other:?}"),
+            }
+        }
+        let declined = [
+            Command::Done,
+            Command::Say { utterance: "ring the bell".to_owned() },
+            Command::Close { reason: "a name mistyped".to_owned() },
+            Command::Forget { lesson: Seq::FIRST },
+            Command::FinishTeaching,
+            Command::StartEpisode { stage: Stage::Task { task: "no such".to_owned(), seed: 1 } },
+        ];
+        for command in declined {
+            let name = command.name();
+            let response = ask(&front, &lab, number, fresh_id(), Ask::Command(command));
+            assert!(matches!(response, Response::Rejected(_)), "{name}: {response:?}");
+        }
+    }
+    assert_eq!(holdings(&store, &lab), before, "nothing was written");
+    // Their first command does, and what they were told of themselves was true.
+    let told = |asked| ask(&front, &lab, 7, fresh_id(), asked);
+    let (Response::Status(seen), Response::Known(known)) =
+        (told(STATUS), told(Ask::Query(Query::Known)))
+    else {
+        panic!("a status and exemplars")
+    };
+    match told(Ask::Command(Command::StartEpisode { stage: stage() })) {
+        Response::Reply(reply) => assert_eq!(reply.first.get(), 2, "opened before"),
+        other => panic!("{other:?}"),
+    }
+    let (Response::Status(now), Response::Known(known_now)) =
+        (told(STATUS), told(Ask::Query(Query::Known)))
+    else {
+        panic!("a status and exemplars")
+    };
+    assert_eq!((seen.recipe, seen.mind, seen.exemplars), (now.recipe, now.mind, now.exemplars));
+    assert_eq!(known, known_now);
+    assert_eq!((now.seq, now.phase), (2, Phase::Interacting));
+    let (bytes, streams) = holdings(&store, &lab);
+    assert_eq!(streams, before.1 + 1);
+    assert!(bytes > before.0 + KEY_FILE_BYTES, "a key is counted with its person");
+}
+
+#[test]
+fn a_full_lab_closes_erases_and_takes_keys_back_and_writes_nothing_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = Data::Directory(dir.path().to_owned());
+    let full = lab("full");
+    let quotas = Quotas { sealed_bytes: Some(20_000), ..Quotas::default() };
+    let service = service(data, &[(&full, quotas)]);
+    let gateway = admit(&service, &full);
+    let operator = CurveKey::new().unwrap();
+    let new_operator =
+        Order::Admit { key: *operator.public(), role: Role::Operator, label: String::new() };
+    obey(service.registrar(), &full, new_operator);
+    let [ada, bob] = [0, 1].map(|number| connect(&service, &gateway, number, LONG));
+    bob.start(stage()).unwrap();
+    fill(&ada);
+    let keys = || std::fs::read_dir(dir.path().join("keys/users/full")).unwrap().count();
+    let operator = connect(&service, &operator, 0, LONG);
+    let before = (keys(), operator.heads().unwrap());
+    for number in 2..30 {
+        let stranger = connect(&service, &gateway, number, LONG);
+        assert_eq!(stranger.status().unwrap().seq, 0);
+        let closed = stranger.close("never begun").unwrap_err();
+        assert!(matches!(closed, ClientError::Rejected { .. }), "{closed}");
+        assert!(matches!(stranger.start(stage()), Err(ClientError::OverQuota { .. })));
+    }
+    // An operator may not command, and looking at a name makes nobody either.
+    let seen = operator.status().unwrap();
+    assert!(seen.seq > 0, "the same person as the gateway's");
+    let admit = Order::Admit {
+        key: *CurveKey::new().unwrap().public(),
+        role: Role::Auditor,
+        label: String::new(),
+    };
+    assert!(matches!(operator.order(None, admit), Err(ClientError::OverQuota { .. })));
+    assert_eq!((keys(), operator.heads().unwrap()), before, "nothing was written");
+
+    bob.close("enough").unwrap();
+    let again = bob.close("once more").unwrap_err();
+    assert!(matches!(again, ClientError::Rejected { .. }), "{again}");
+    operator.erase(None, user(0)).unwrap();
+    let retire = Order::Retire { key: *gateway.public(), overlap_seconds: 0 };
+    assert_eq!(operator.order(None, retire).unwrap().recorded, 1);
+    service.stop().unwrap();
 }

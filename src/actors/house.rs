@@ -123,6 +123,11 @@ impl Front {
         Ok(())
     }
 
+    /// Notes that something was not sent, because the tenant's connections do not read.
+    pub fn note_unread(&self, tenant: &TenantId) {
+        self.meters.note_unread(tenant);
+    }
+
     pub fn submit(&self, mut submit: Submit) -> Result<(), NotTaken> {
         if let Err(response) = self.let_in(&submit.tenant, &submit.ask, &mut submit.answer) {
             return Err(NotTaken::Over(Box::new(submit), response));

@@ -17,8 +17,8 @@ use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
 use crate::sabotage;
-use crate::session::{Command, Proposed, Session};
-use crate::store::{AppendError, EventLog, KeyError, Store};
+use crate::session::{Command, Proposed, Rejection, Session, Turn};
+use crate::store::{EventLog, KeyError, Store};
 use crate::world::Domain;
 
 /// What the actors are made from, before there is an actix system.
@@ -57,6 +57,7 @@ pub(super) struct Seeded<D: Domain> {
 pub(super) struct Life<D: Domain> {
     domain: Arc<D>,
     store: Store,
+    recipe: Recipe,
     recipe_text: String,
     base: Arc<Mind>,
     minds: Arc<Minds>,
@@ -81,7 +82,7 @@ impl<D: Domain> Life<D> {
         let Parts {
             domain,
             store,
-            recipe: _,
+            recipe,
             recipe_text,
             trainers,
             minds,
@@ -93,6 +94,7 @@ impl<D: Domain> Life<D> {
         let life = Arc::new(Life {
             domain,
             store,
+            recipe,
             recipe_text,
             base,
             minds,
@@ -123,6 +125,11 @@ impl<D: Domain> Life<D> {
     /// Who is told of what became durable.
     pub fn growths(&self) -> &Growths {
         &self.growths
+    }
+
+    /// The recipe that new people start with.
+    pub fn recipe(&self) -> &Recipe {
+        &self.recipe
     }
 
     pub fn failure(&self) -> &Failure {
@@ -184,6 +191,11 @@ impl<D: Domain> Life<D> {
         self.trainings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The mind that new people start with.
+    pub fn base(&self) -> &Arc<Mind> {
+        &self.base
+    }
+
     pub fn mind(&self, tenant: &TenantId, digest: Digest) -> Option<Arc<Mind>> {
         self.minds.get(tenant, digest)
     }
@@ -207,57 +219,40 @@ impl<D: Domain> Life<D> {
     }
 }
 
-/// Rebuilds a session from the log; for somebody new, opens the stream first. Blocks.
+/// Rebuilds a session from the log. That of somebody new is not open, and nothing is written for
+/// them: only a command does that. Blocks.
 ///
 /// - errors: what to answer to whoever asks for this person.
 pub(super) fn wake<D: Domain>(
     life: &Life<D>,
     stream: &StreamId,
-    user: &UserId,
 ) -> Result<Session<D>, Box<Response>> {
-    let unavailable = |reason: String| {
-        let message = format!("this session cannot be woken: {reason}");
-        Box::new(Response::error(ErrorCode::Unavailable, message))
-    };
     // Never pushed out of the memory of minds for long: everybody begins with it.
     life.remember(&stream.tenant, life.base.clone());
-    let mut session = replay::rebuild(&life.domain, &life.store, stream, &life.minds)
-        .map_err(|error| unavailable(error.to_string()))?;
-    if session.is_open() {
-        return Ok(session);
-    }
+    replay::rebuild(&life.domain, &life.store, stream, &life.minds).map_err(|error| {
+        let message = format!("this session cannot be woken: {error}");
+        Box::new(Response::error(ErrorCode::Unavailable, message))
+    })
+}
+
+/// The turn that opens the session of somebody new.
+///
+/// - errors: why there is none.
+pub(super) fn open<D: Domain>(
+    life: &Life<D>,
+    session: &Session<D>,
+    user: &UserId,
+) -> Result<Turn, Rejection> {
     let command = Command::Open {
         user: user.clone(),
         recipe_text: life.recipe_text.clone(),
         mind: life.base.digest(),
     };
-    let proposed = session.propose(&command, fresh_request(), session.next_at(life.now()));
-    let turn = match proposed {
-        Ok(Proposed::Turn(turn)) => turn,
-        Ok(Proposed::Repeat { .. }) => unreachable!("a fresh request id was not answered before"),
-        Err(rejection) => return Err(unavailable(rejection.to_string())),
-    };
-    let durable = match life.log().append(stream, turn.after, turn.batch).wait() {
-        Ok(durable) => durable,
-        Err(error @ (AppendError::Busy { .. } | AppendError::Conflict { .. })) => {
-            return Err(Box::new(Response::busy(error.to_string(), RETRY_WAKE_MS)));
-        }
-        Err(error) => {
-            if matches!(error, AppendError::Poisoned { .. } | AppendError::Gone) {
-                life.failure.report(error.to_string());
-            }
-            return Err(unavailable(error.to_string()));
-        }
-    };
-    life.growths.note(stream, &durable);
-    session.settle(&durable).map_err(|divergence| unavailable(divergence.to_string()))?;
-    session.install(life.base.clone());
-    tracing::info!(%stream, "somebody new");
-    Ok(session)
+    match session.propose(&command, fresh_request(), session.next_at(life.now()))? {
+        Proposed::Turn(turn) => Ok(turn),
+        Proposed::Repeat { .. } => unreachable!("a fresh request id was not answered before"),
+    }
 }
-
-/// Milliseconds after which a new person's first request may be sent again.
-const RETRY_WAKE_MS: u32 = 100;
 
 /// Trains a mind and keeps its bytes, before any record names them. Runs on a trainer's thread.
 ///

@@ -3,13 +3,14 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
 
+use super::operator::{TenantAsk, TenantVerb};
 use super::response::{Ask, Quota, QuotaExceeded, Response};
 use crate::fairness::{Bucket, Room, TOKEN};
 use crate::ids::TenantId;
 use crate::limits::GATEWAY_IN_FLIGHT_MAX;
 use crate::session::Command;
 use crate::store::EventLog;
-use crate::tenancy::{Admissions, Quotas};
+use crate::tenancy::{Admissions, Order, Quotas};
 
 /// What each tenant takes of what all share, held against what it may. Requests are measured where
 /// they come in: who is over a limit hears so at once, from the gateway's thread, and costs the
@@ -39,6 +40,7 @@ struct Counts {
     sealed_bytes: AtomicU64,
     trainings: AtomicU64,
     busy: AtomicU64,
+    unread: AtomicU64,
 }
 
 /// How often a tenant was turned away since the start, by what it had too much of.
@@ -52,6 +54,8 @@ pub struct Refusals {
     pub trainings: u64,
     /// Turned away not by a quota, but because all tenants together left no room.
     pub busy: u64,
+    /// Answers and messages of the feed that were dropped, because too much waited to be read.
+    pub unread: u64,
 }
 
 /// What a tenant takes now.
@@ -108,7 +112,7 @@ impl Meters {
         Ok(in_flight)
     }
 
-    /// Whoever has used up the room in the log may still ask, and withdraw.
+    /// Who has used up the room in the log may still ask, withdraw, erase people and take keys back.
     fn check_bytes(
         &self,
         tenant: &TenantId,
@@ -116,8 +120,15 @@ impl Meters {
         quotas: &Quotas,
         meter: &Meter,
     ) -> Result<(), Box<Response>> {
-        let appends =
-            matches!(ask, Ask::Command(command) if !matches!(command, Command::Close { .. }));
+        let appends = match ask {
+            Ask::Command(command) => !matches!(command, Command::Close { .. }),
+            // The host's orders are how a lab gets out of this.
+            Ask::Order(TenantAsk { verb: TenantVerb::Give(order), .. }) => {
+                *tenant != TenantId::local()
+                    && matches!(order, Order::Admit { .. } | Order::Rotate { .. })
+            }
+            _ => false,
+        };
         let Some(limit) = quotas.sealed_bytes.filter(|_| appends) else { return Ok(()) };
         // Counted before the quota was made known; an error here is one of reading the log, which
         // whoever reads or writes it next will say better.
@@ -165,6 +176,13 @@ impl Meters {
     /// Notes that a request met a crowd that is not its tenant's alone.
     pub fn note_busy(&self, tenant: &TenantId) {
         self.meter(tenant).refused.busy.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Notes that something was not sent, because the tenant's connections do not read.
+    pub fn note_unread(&self, tenant: &TenantId) {
+        if self.meter(tenant).refused.unread.fetch_add(1, Ordering::Relaxed) == 0 {
+            tracing::warn!(%tenant, "a tenant's connections do not read: what they miss is dropped");
+        }
     }
 
     /// Notes that a training found its tenant's queue full.
@@ -223,6 +241,7 @@ impl Counts {
             sealed_bytes: read(&self.sealed_bytes),
             trainings: read(&self.trainings),
             busy: read(&self.busy),
+            unread: read(&self.unread),
         }
     }
 }
@@ -255,11 +274,11 @@ fn over(quota: Quota, used: u64, limit: u64, retry_after_ms: Option<u32>) -> Quo
 mod tests {
     use super::super::wall_clock;
     use super::*;
-    use crate::ids::StreamId;
+    use crate::ids::{PublicKey, StreamId, UserId};
     use crate::session::Query;
     use crate::store::conformance::{batch, stream};
     use crate::store::{Store, open_memory};
-    use crate::tenancy::{Registry, Standing};
+    use crate::tenancy::{Registry, Role, Standing};
 
     fn meters(store: &Store, quotas: Quotas) -> (Arc<Meters>, TenantId) {
         let (admissions, lab) = (Admissions::new(wall_clock()), TenantId::new("lab").unwrap());
@@ -347,6 +366,21 @@ mod tests {
         assert!(meters.admit(&lab, &Ask::Query(Query::Known)).is_ok());
         let close = Command::Close { reason: "enough".to_owned() };
         assert!(meters.admit(&lab, &Ask::Command(close)).is_ok());
+        // An operator of the lab, and one of the host.
+        let (key, label) = (PublicKey([3; 32]), String::new());
+        let admit = Order::Admit { key, role: Role::Gateway, label };
+        let give = |order: &Order| {
+            Ask::Order(TenantAsk {
+                tenant: Some(lab.clone()),
+                verb: TenantVerb::Give(order.clone()),
+            })
+        };
+        assert_eq!(refused(meters.admit(&lab, &give(&admit))).quota, Quota::SealedBytes);
+        assert!(meters.admit(&TenantId::local(), &give(&admit)).is_ok());
+        let retire = Order::Retire { key, overlap_seconds: 0 };
+        assert!(meters.admit(&lab, &give(&retire)).is_ok());
+        let verb = TenantVerb::Erase { user: UserId::new("ada").unwrap() };
+        assert!(meters.admit(&lab, &Ask::Order(TenantAsk { tenant: None, verb })).is_ok());
     }
 
     #[test]

@@ -18,8 +18,8 @@ use crate::learning;
 use crate::limits::{MAILBOX_MAX, WAIT_S_MAX, WAITERS_MAX};
 use crate::sabotage;
 use crate::session::{
-    Command, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Told, Turn,
-    reply_of,
+    Command, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Status, Told,
+    Turn, reply_of,
 };
 use crate::store::AppendError;
 use crate::world::Domain;
@@ -106,7 +106,7 @@ impl<D: Domain> UserActor<D> {
         };
         match ask {
             Ask::Command(command) => return self.perform(command, request, Some(answer)),
-            Ask::Query(query) => match view(session, query) {
+            Ask::Query(query) => match view(&self.life, session, query) {
                 Ok(response) => answer.send(response),
                 Err(panic) => {
                     answer.send(*panic);
@@ -125,8 +125,8 @@ impl<D: Domain> UserActor<D> {
     fn wait(&mut self, seconds: u32, answer: AnswerTo, ctx: &mut Context<Self>) {
         let Stage::Awake(session) = &self.stage else { return };
         if session.phase() != Phase::Learning {
-            let waited = Waited { status: session.status(), told: self.last_told.clone() };
-            answer.send(Response::Waited(waited));
+            let status = status(&self.life, session);
+            answer.send(Response::Waited(Waited { status, told: self.last_told.clone() }));
             return;
         }
         if self.waiters.len() >= WAITERS_MAX {
@@ -157,6 +157,7 @@ impl<D: Domain> UserActor<D> {
         answer: Option<AnswerTo>,
     ) -> Atomic<D> {
         let Stage::Awake(session) = &self.stage else { return Self::done() };
+        let is_new = !session.is_open();
         let at = session.next_at(self.life.now());
         // Rust cannot know it, but `propose` only reads: a panic leaves the session as it was.
         let proposed = catch_unwind(AssertUnwindSafe(|| {
@@ -184,6 +185,10 @@ impl<D: Domain> UserActor<D> {
                 return Self::done();
             }
         };
+        // What is declined makes nobody; this is the first command that is not.
+        if is_new {
+            return self.open(command, request, answer);
+        }
         let Turn { after, batch } = turn;
         let pending = self.life.log().append(&self.waking.stream, after, batch);
         Box::pin(pending.into_actor(self).map(move |result, actor, ctx| match result {
@@ -192,6 +197,39 @@ impl<D: Domain> UserActor<D> {
                 actor.settle(&command, &durable, answer, ctx);
             }
             Err(error) => actor.append_failed(error, answer),
+        }))
+    }
+
+    /// Records who is new, and then carries out their first command.
+    fn open(&mut self, first: Command, request: RequestId, answer: Option<AnswerTo>) -> Atomic<D> {
+        let Stage::Awake(session) = &self.stage else { return Self::done() };
+        let Turn { after, batch } = match life::open(&self.life, session, &self.waking.user) {
+            Ok(turn) => turn,
+            Err(rejection) => {
+                respond(answer, Response::error(ErrorCode::Unavailable, rejection.to_string()));
+                return Self::done();
+            }
+        };
+        let pending = self.life.log().append(&self.waking.stream, after, batch);
+        Box::pin(pending.into_actor(self).then(move |result, actor, _| {
+            let durable = match result {
+                Ok(durable) => durable,
+                Err(error) => {
+                    actor.append_failed(error, answer);
+                    return Self::done();
+                }
+            };
+            actor.life.growths().note(&actor.waking.stream, &durable);
+            let Stage::Awake(session) = &mut actor.stage else { return Self::done() };
+            if let Err(divergence) = session.settle(&durable) {
+                tracing::error!(stream = %actor.waking.stream, %divergence, "binary and log disagree");
+                respond(answer, Response::error(ErrorCode::Internal, divergence.to_string()));
+                actor.leave();
+                return Self::done();
+            }
+            session.install(actor.life.base().clone());
+            tracing::info!(stream = %actor.waking.stream, "somebody new");
+            actor.perform(first, request, answer)
         }))
     }
 
@@ -318,11 +356,10 @@ impl<D: Domain> Actor for UserActor<D> {
 
     fn started(&mut self, ctx: &mut Context<Self>) {
         ctx.set_mailbox_capacity(MAILBOX_MAX);
-        let (life, stream, user) =
-            (self.life.clone(), self.waking.stream.clone(), self.waking.user.clone());
+        let (life, stream) = (self.life.clone(), self.waking.stream.clone());
         // Reading a long stream, or training a mind again, must not hold up the other people of
         // this arbiter.
-        let rebuilt = tokio::task::spawn_blocking(move || life::wake(&life, &stream, &user));
+        let rebuilt = tokio::task::spawn_blocking(move || life::wake(&life, &stream));
         ctx.wait(rebuilt.into_actor(self).map(|result, actor, ctx| {
             let woken = result.unwrap_or_else(|panic| {
                 let message = format!("waking failed: {panic}");
@@ -330,7 +367,11 @@ impl<D: Domain> Actor for UserActor<D> {
             });
             match woken {
                 Ok(session) => {
+                    let is_new = !session.is_open();
                     actor.stage = Stage::Awake(Box::new(session));
+                    if is_new {
+                        return;
+                    }
                     // What a crash kept from being closed.
                     actor.life.registrar().close(&actor.waking.stream);
                     actor.ask_for_training(ctx);
@@ -380,7 +421,9 @@ impl<D: Domain> Handler<Sleep> for UserActor<D> {
     type Result = ();
 
     fn handle(&mut self, _: Sleep, ctx: &mut Context<Self>) {
-        if let Stage::Awake(session) = &self.stage {
+        if let Stage::Awake(session) = &self.stage
+            && session.is_open()
+        {
             life::keep_snapshot(&self.life, &self.waking.stream, session);
         }
         ctx.stop();
@@ -394,9 +437,14 @@ fn respond(answer: Option<AnswerTo>, response: Response) {
 }
 
 /// - errors: what to answer when the session panicked; it is then to be left.
-fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Box<Response>> {
+fn view<D: Domain>(
+    life: &Life<D>,
+    session: &Session<D>,
+    query: Query,
+) -> Result<Response, Box<Response>> {
     catch_unwind(AssertUnwindSafe(|| match query {
-        Query::Status => Response::Status(session.status()),
+        Query::Status => Response::Status(status(life, session)),
+        Query::Known if !session.is_open() => Response::Known(session.known_before(life.base())),
         Query::Known => Response::Known(session.known()),
         Query::Look => match session.look() {
             Some(view) => Response::Look(view),
@@ -407,6 +455,14 @@ fn view<D: Domain>(session: &Session<D>, query: Query) -> Result<Response, Box<R
         },
     }))
     .map_err(|panic| Box::new(defect("looking", &*panic)))
+}
+
+/// Of a name that nothing was recorded of: what its bearer would start with.
+fn status<D: Domain>(life: &Life<D>, session: &Session<D>) -> Status {
+    match session.is_open() {
+        true => session.status(),
+        false => session.status_before(life.recipe(), life.base()),
+    }
 }
 
 fn defect(doing: &str, panic: &(dyn std::any::Any + Send)) -> Response {

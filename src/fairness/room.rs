@@ -42,6 +42,13 @@ impl Room {
         }
     }
 
+    /// What a tenant may still take, as things stand.
+    pub fn free_for(&self, tenant: &TenantId) -> usize {
+        // Twice: what it takes is no longer free.
+        let most = self.most.saturating_mul(2).saturating_sub(self.total);
+        most.saturating_sub(self.held_by(tenant)) / 2
+    }
+
     pub fn held_by(&self, tenant: &TenantId) -> usize {
         self.held.get(tenant).copied().unwrap_or(0)
     }
@@ -84,6 +91,18 @@ mod tests {
         assert!(room.take(&tenant(1), 8) && room.take(&tenant(1), 8));
         room.give_back(&tenant(0), 60);
         assert_eq!(room.total(), 16);
+    }
+
+    #[test]
+    fn what_is_free_can_be_taken_and_one_more_cannot() {
+        let mut room = Room::new(64);
+        assert!(room.take(&tenant(0), 20) && room.take(&tenant(1), 7));
+        for lab in 0..3 {
+            let free = room.free_for(&tenant(lab));
+            assert!(!room.take(&tenant(lab), free + 1), "lab {lab} may take {free}");
+            assert!(room.take(&tenant(lab), free));
+            room.give_back(&tenant(lab), free);
+        }
     }
 
     proptest! {

@@ -14,9 +14,12 @@ pub struct Counters {
     pub(super) undelivered: AtomicU64,
     pub(super) handshakes: AtomicU64,
     pub(super) handshakes_denied: AtomicU64,
+    pub(super) unread: AtomicU64,
+    pub(super) feed_unread: AtomicU64,
+    pub(super) handshakes_crowded: AtomicU64,
 }
 
-/// [`Counters`] at one moment, in messages; the last two in handshakes.
+/// [`Counters`] at one moment, in messages; those of handshakes in handshakes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     pub received: u64,
@@ -33,12 +36,18 @@ pub struct Counts {
     pub busy: u64,
     /// Turned away by the gateway because their tenant takes more than it may.
     pub over_quota: u64,
-    /// Answers whose peer was gone or did not read.
+    /// Answers whose peer was gone, or has a thousand messages to read.
     pub undelivered: u64,
     /// Connections let in by their key.
     pub handshakes: u64,
     /// Connections whose key was not let in.
     pub handshakes_denied: u64,
+    /// Answers that were dropped, because too many bytes waited for their connection or its tenant.
+    pub unread: u64,
+    /// Messages of the feed that were left out, because too many bytes of their tenant's waited.
+    pub feed_unread: u64,
+    /// Connections that were not let in because there were too many.
+    pub handshakes_crowded: u64,
 }
 
 impl Counters {
@@ -56,6 +65,9 @@ impl Counters {
             undelivered: read(&self.undelivered),
             handshakes: read(&self.handshakes),
             handshakes_denied: read(&self.handshakes_denied),
+            unread: read(&self.unread),
+            feed_unread: read(&self.feed_unread),
+            handshakes_crowded: read(&self.handshakes_crowded),
         }
     }
 }

@@ -1,13 +1,15 @@
+use super::passes::Passes;
+use super::raw::Outlet;
 use super::rights::Caller;
 use super::zap::{DOMAIN, Seal};
 use super::{Context, CurveKey, Endpoint, GatewayError, lock};
 use crate::ids::PublicKey;
-use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX};
+use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX, UNREAD_MAX};
 use crate::tenancy::Admissions;
 
 /// One ROUTER, and what it takes to come in through it.
 pub(super) struct Door {
-    pub socket: zmq::Socket,
+    pub socket: Outlet,
     bolt: Bolt,
 }
 
@@ -17,6 +19,7 @@ enum Bolt {
     Keys {
         admissions: Admissions,
         seal: Seal,
+        passes: Passes,
     },
 }
 
@@ -25,6 +28,7 @@ pub(super) struct Keyed<'a> {
     pub key: &'a CurveKey,
     pub admissions: Admissions,
     pub seal: Seal,
+    pub passes: Passes,
 }
 
 /// One whole message.
@@ -49,6 +53,8 @@ pub(super) enum Sender {
 const LINGER_MS: i32 = 1_000;
 /// What a connection's handshake left for each of its messages.
 const USER_ID: &str = "User-Id";
+/// The number of its descriptor in this process.
+const DESCRIPTOR: &str = "__fd";
 
 impl Door {
     /// A door that listens nowhere yet.
@@ -56,7 +62,7 @@ impl Door {
     /// - `keys`: none for the single user's.
     pub fn new(context: &Context, keys: Option<Keyed<'_>>) -> Result<Door, GatewayError> {
         let start = |error: zmq::Error| GatewayError::Start { reason: error.to_string() };
-        let socket = context.socket(zmq::ROUTER).map_err(start)?;
+        let socket = Outlet::new(context.socket(zmq::ROUTER).map_err(start)?);
         // An answer for a peer that is gone, or that does not read, is an error that is counted; it
         // must neither vanish silently nor block everybody else.
         socket.set_router_mandatory(true).map_err(start)?;
@@ -64,11 +70,13 @@ impl Door {
         // memory; between the two bounds it gets a sentence.
         socket.set_maxmsgsize(2 * FRAME_BYTES_MAX as i64).map_err(start)?;
         socket.set_linger(LINGER_MS).map_err(start)?;
+        socket.set_rcvhwm(UNREAD_MAX).map_err(start)?;
+        socket.bound_sending().map_err(start)?;
         let bolt = match keys {
             None => Bolt::Open,
-            Some(Keyed { key, admissions, seal }) => {
+            Some(Keyed { key, admissions, seal, passes }) => {
                 lock::put_on(&socket, key, DOMAIN).map_err(start)?;
-                Bolt::Keys { admissions, seal }
+                Bolt::Keys { admissions, seal, passes }
             }
         };
         Ok(Door { socket, bolt })
@@ -115,10 +123,10 @@ impl Door {
     }
 
     fn sender(&self, frame: &mut zmq::Message) -> Sender {
-        let Bolt::Keys { admissions, seal } = &self.bolt else {
+        let Bolt::Keys { admissions, seal, passes } = &self.bolt else {
             return Sender::Known(Caller::Local);
         };
-        match frame.gets(USER_ID).and_then(|user_id| seal.key_of(user_id)) {
+        match vouched(seal, passes, frame) {
             None => Sender::Unvouched,
             // Asked for each message: a key that is taken back ends with its next one.
             Some(key) => match admissions.admit(&key) {
@@ -136,6 +144,18 @@ impl Door {
             Bolt::Keys { .. } => routing_id.len() == GIVEN_ID_BYTES && routing_id[0] == 0,
         }
     }
+}
+
+/// Whose connection a frame came through, if its handshake was answered here; notes which
+/// descriptor it has.
+pub(super) fn vouched(seal: &Seal, passes: &Passes, frame: &mut zmq::Message) -> Option<PublicKey> {
+    let (number, key) = seal.read(frame.gets(USER_ID)?)?;
+    if passes.is_new(number)
+        && let Some(descriptor) = frame.gets(DESCRIPTOR).and_then(|text| text.parse().ok())
+    {
+        passes.seen(number, descriptor);
+    }
+    Some(key)
 }
 
 /// Bytes of a routing id that ZeroMQ gives: a zero and a number.
@@ -157,7 +177,8 @@ mod tests {
     fn a_message_whose_handshake_nobody_answered_is_vouched_for_by_nobody() {
         let (context, key) = (Context::new(), CurveKey::new().unwrap());
         let admissions = Admissions::new(wall_clock());
-        let keyed = Keyed { key: &key, admissions, seal: Seal::fresh() };
+        let (seal, passes) = (Seal::fresh(), Passes::new());
+        let keyed = Keyed { key: &key, admissions, seal, passes };
         let door = Door::new(&context, Some(keyed)).unwrap();
         let endpoint = Endpoint::parse("tcp://127.0.0.1:0").unwrap();
         let bound = door.bind(&[endpoint]).unwrap();

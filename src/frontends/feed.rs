@@ -7,7 +7,7 @@
 //! opened anew, before anything is published after a key that could have come in was taken back:
 //! everybody else reconnects by themselves and fetches what they missed.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::{self, JoinHandle};
@@ -15,11 +15,17 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::counters::{Counters, count};
+use super::door::vouched;
 use super::outbox::{Inbox, Outbox};
-use super::zap::Gate;
+use super::passes::Passes;
+use super::raw::Outlet;
+use super::unsent::Unsent;
+use super::zap::{Gate, Seal};
 use super::{Context, CurveKey, Endpoint, GatewayError, lock, rights, wire};
-use crate::actors::{Failure, FeedView, Growth, Growths, PlainView, Reader, SealedView};
+use crate::actors::{Failure, FeedView, Front, Growth, Growths, PlainView, Reader, SealedView};
 use crate::ids::{PublicKey, RequestId, Seq, TenantId};
+use crate::limits::{CUT_OFF_S, FEED_UNSENT_BYTES_MAX, FOREIGN_TOPICS_MAX, TOPICS_MAX};
 use crate::tenancy::Admissions;
 
 /// A message of the feed, beside its topic.
@@ -68,6 +74,15 @@ pub struct FeedDoor<'a> {
     pub waiting_max: i32,
     pub growths: Growths,
     pub reader: Reader,
+}
+
+/// What the feed holds its subscribers against.
+pub(super) struct Watch {
+    pub admissions: Admissions,
+    pub seal: Seal,
+    pub passes: Passes,
+    pub counters: Arc<Counters>,
+    pub front: Front,
 }
 
 /// The thread that publishes. Closes its sockets when dropped.
@@ -129,7 +144,7 @@ impl Feed {
         context: &Context,
         door: FeedDoor<'_>,
         key: &CurveKey,
-        admissions: Admissions,
+        watch: Watch,
         failure: Failure,
     ) -> Result<Feed, GatewayError> {
         let start = |error: std::io::Error| GatewayError::Start { reason: error.to_string() };
@@ -142,7 +157,8 @@ impl Feed {
             ports_taken: 0,
             waiting_max,
             key: key.clone(),
-            admissions,
+            watch,
+            unsent: Unsent::new(FEED_UNSENT_BYTES_MAX),
             growths: growths.clone(),
             reader,
             failure: failure.clone(),
@@ -191,7 +207,9 @@ struct Press {
     ports_taken: u16,
     waiting_max: i32,
     key: CurveKey,
-    admissions: Admissions,
+    watch: Watch,
+    /// Messages that have not left the process.
+    unsent: Unsent,
     growths: Growths,
     reader: Reader,
     failure: Failure,
@@ -202,7 +220,7 @@ struct Press {
 /// One tenant's sockets, the sealed one first.
 struct Stand {
     tenant: TenantId,
-    sockets: [Option<zmq::Socket>; 2],
+    sockets: [Option<Subscribed>; 2],
     /// Where they are, or are to be.
     endpoints: [String; 2],
     /// Keys that could have come in and may not any more, when the sockets were opened.
@@ -211,19 +229,97 @@ struct Stand {
     warned: bool,
 }
 
+/// A socket, and what was subscribed to at it.
+struct Subscribed {
+    socket: Outlet,
+    topics: Topics,
+}
+
+/// Bounds for what each key may subscribe to. `libzmq` keeps a tree of all topics that subscribers
+/// ask for, and has no bound of its own; it tells of each topic that is new or that nobody wants
+/// any more.
+#[derive(Debug, Default)]
+struct Topics {
+    of: HashMap<Vec<u8>, PublicKey>,
+    /// Of each key: topics that are published, and others.
+    counts: BTreeMap<PublicKey, [usize; 2]>,
+}
+
+impl Topics {
+    /// - returns: whether the key has subscribed to too much.
+    fn add(&mut self, topic: &[u8], key: PublicKey) -> bool {
+        let foreign = usize::from(!is_published(topic));
+        if self.of.insert(topic.to_vec(), key).is_some() {
+            return false;
+        }
+        let counts = self.counts.entry(key).or_default();
+        counts[foreign] += 1;
+        counts[foreign] > [TOPICS_MAX, FOREIGN_TOPICS_MAX][foreign]
+    }
+
+    fn remove(&mut self, topic: &[u8]) {
+        let Some(key) = self.of.remove(topic) else { return };
+        if let Some(counts) = self.counts.get_mut(&key) {
+            let foreign = usize::from(!is_published(topic));
+            counts[foreign] = counts[foreign].saturating_sub(1);
+            if *counts == [0, 0] {
+                self.counts.remove(&key);
+            }
+        }
+    }
+}
+
+/// Whether something may be published under `topic`, or under one that begins with it.
+fn is_published(topic: &[u8]) -> bool {
+    let hex = |byte: &u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(byte);
+    BEAT.as_bytes().starts_with(topic)
+        || (topic.len() <= 2 * size_of::<StreamKey>() && topic.iter().all(hex))
+}
+
+impl Subscribed {
+    /// Takes what subscribers have sent.
+    ///
+    /// - returns: the key that has subscribed to too much, if one has.
+    fn hear(&mut self, watch: &Watch) -> zmq::Result<Option<PublicKey>> {
+        for _ in 0..BURST {
+            let mut frame = match self.socket.recv_msg(zmq::DONTWAIT) {
+                Ok(frame) => frame,
+                Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => return Ok(None),
+                Err(error) => return Err(error),
+            };
+            let key = vouched(&watch.seal, &watch.passes, &mut frame);
+            match (frame.split_first(), key) {
+                (Some((1, topic)), Some(key)) => {
+                    if self.topics.add(topic, key) {
+                        return Ok(Some(key));
+                    }
+                }
+                (Some((0, topic)), _) => self.topics.remove(topic),
+                // No subscription; whoever nobody vouched for is not there while the doorkeeper is.
+                _ => {}
+            }
+        }
+        Ok(None)
+    }
+}
+
 impl Press {
     fn serve(mut self, mut inbox: Inbox<()>, stopping: &AtomicBool) {
         let mut beaten = Instant::now();
         loop {
             let due = BEAT_EVERY.saturating_sub(beaten.elapsed());
-            let mut items = [zmq::PollItem::from_fd(inbox.fd(), zmq::POLLIN)];
+            let mut items = vec![zmq::PollItem::from_fd(inbox.fd(), zmq::POLLIN)];
+            let sockets = self.stands.values().flat_map(|stand| stand.sockets.iter().flatten());
+            items.extend(sockets.map(|at| at.socket.as_poll_item(zmq::POLLIN)));
             match zmq::poll(&mut items, due.as_millis() as i64) {
                 Ok(_) | Err(zmq::Error::EINTR) => {}
                 Err(error) => {
                     return self.failure.report(format!("the feed cannot wait: {error}"));
                 }
             }
+            drop(items);
             inbox.drain();
+            self.hear();
             let stops = stopping.load(Ordering::SeqCst);
             while let Some(growth) = self.growths.next() {
                 self.publish(&growth);
@@ -242,9 +338,34 @@ impl Press {
         }
     }
 
+    /// Reads subscriptions, and cuts off who subscribes to too much. A connection cannot be ended
+    /// alone: its tenant's sockets are closed, which forgets all topics, and opened anew.
+    fn hear(&mut self) {
+        let Press { stands, watch, .. } = self;
+        for stand in stands.values_mut() {
+            let mut cut_off = None;
+            for subscribed in stand.sockets.iter_mut().flatten() {
+                match subscribed.hear(watch) {
+                    Ok(None) => {}
+                    Ok(Some(key)) => cut_off = Some(key),
+                    Err(error) => tracing::warn!(%error, "subscriptions cannot be read"),
+                }
+            }
+            if let Some(key) = cut_off {
+                let tenant = &stand.tenant;
+                tracing::warn!(
+                    %tenant, %key, seconds = CUT_OFF_S,
+                    "a key subscribed to too many topics: it is cut off, and its feed opened anew"
+                );
+                watch.passes.cut_off(key);
+                stand.close();
+            }
+        }
+    }
+
     /// - errors: an endpoint is taken.
     fn open_all(&mut self) -> Result<(), GatewayError> {
-        for tenant in self.admissions.tenants() {
+        for tenant in self.watch.admissions.tenants() {
             self.tend(&tenant);
             let Some(stand) = self.stands.get(&tenant) else { continue };
             if let Some(at) = stand.sockets.iter().position(Option::is_none) {
@@ -258,9 +379,9 @@ impl Press {
     /// Brings a tenant's sockets up to date with its register: none for who has no followers, and
     /// new ones when somebody who could have come in may not any more.
     fn tend(&mut self, tenant: &TenantId) {
-        let Some(standing) = self.admissions.standing(tenant) else { return };
+        let Some(standing) = self.watch.admissions.standing(tenant) else { return };
         // Read after the register: see `Admissions`.
-        let wall = self.admissions.clock().read();
+        let wall = self.watch.admissions.clock().read();
         let may_follow =
             standing.keys().iter().filter(|(_, key)| rights::SEALED.contains(&key.role));
         let (admitted, ended): (BTreeSet<PublicKey>, BTreeSet<PublicKey>) =
@@ -321,7 +442,7 @@ impl Press {
         let count = (growth.last.get() - growth.first.get() + 1) as u32;
         let number = |seq: Seq| growth.number + (seq.get() - growth.first.get());
         let start = self.views.start;
-        if let Some(socket) = &stand.sockets[0] {
+        if let Some(Subscribed { socket, .. }) = &stand.sockets[0] {
             match self.reader.sealed(&growth.stream, growth.first, count) {
                 Ok(read) => {
                     for record in read.records {
@@ -329,14 +450,15 @@ impl Press {
                         let number = number(record.seq);
                         let sealed = Some(record);
                         let v = wire::VERSION;
-                        send(socket, topic, &FeedMessage { v, start, number, sealed, plain: None });
+                        let message = FeedMessage { v, start, number, sealed, plain: None };
+                        self.send(tenant, socket, topic, &message);
                     }
                 }
                 // Whoever asks at the door hears it, and the operator's log says it.
                 Err(error) => tracing::error!(%tenant, %error, "records cannot be published"),
             }
         }
-        if let Some(socket) = &stand.sockets[1] {
+        if let Some(Subscribed { socket, .. }) = &stand.sockets[1] {
             match self.reader.plain(&growth.stream, growth.first, count) {
                 Ok(read) => {
                     for record in read.records {
@@ -344,7 +466,8 @@ impl Press {
                         let number = number(record.seq);
                         let plain = Some(record);
                         let v = wire::VERSION;
-                        send(socket, topic, &FeedMessage { v, start, number, sealed: None, plain });
+                        let message = FeedMessage { v, start, number, sealed: None, plain };
+                        self.send(tenant, socket, topic, &message);
                     }
                 }
                 Err(error) => tracing::error!(%tenant, %error, "records cannot be published"),
@@ -352,8 +475,19 @@ impl Press {
         }
     }
 
+    fn send(&self, tenant: &TenantId, socket: &Outlet, topic: String, message: &FeedMessage) {
+        let Some(parcel) = self.unsent.pack(tenant, None, message.encode()) else {
+            count(&self.watch.counters.feed_unread);
+            return self.watch.front.note_unread(tenant);
+        };
+        // A publisher never waits; who did not get it will see that its number is missing.
+        if let Err(error) = socket.send_parcel(vec![topic.into_bytes()], parcel) {
+            tracing::warn!(%error, "a message of the feed was not sent");
+        }
+    }
+
     fn beat(&mut self) {
-        for tenant in self.admissions.tenants() {
+        for tenant in self.watch.admissions.tenants() {
             self.tend(&tenant);
         }
         let Some(numbers) = self.growths.all_taken() else { return };
@@ -361,8 +495,8 @@ impl Press {
         for (tenant, stand) in &self.stands {
             let number = numbers.get(tenant).copied().unwrap_or(0);
             let beat = FeedMessage { v, start, number, sealed: None, plain: None };
-            for socket in stand.sockets.iter().flatten() {
-                send(socket, BEAT.to_owned(), &beat);
+            for Subscribed { socket, .. } in stand.sockets.iter().flatten() {
+                self.send(tenant, socket, BEAT.to_owned(), &beat);
             }
         }
     }
@@ -376,28 +510,25 @@ impl Drop for Press {
     }
 }
 
-fn send(socket: &zmq::Socket, topic: String, message: &FeedMessage) {
-    let frames = [topic.into_bytes(), message.encode()];
-    // A publisher never waits; whoever did not get it will see that its number is missing.
-    if let Err(error) = socket.send_multipart(frames, zmq::DONTWAIT) {
-        tracing::warn!(%error, "a message of the feed was not sent");
-    }
-}
-
 impl Stand {
     /// Ends every connection at once, and what waits for them.
     fn close(&mut self) {
-        for socket in self.sockets.iter_mut().filter_map(Option::take) {
+        for subscribed in self.sockets.iter_mut().filter_map(Option::take) {
             // Fails for a closed socket only, which this is not.
-            let _ = socket.set_linger(0);
+            let _ = subscribed.socket.set_linger(0);
         }
     }
 
     fn open(&mut self, place: usize, context: &Context, key: &CurveKey, waiting_max: i32) {
         let gate = Gate::Feed { tenant: self.tenant.clone(), plain: place == 1 };
         let endpoint = &self.endpoints[place];
-        let open = || -> zmq::Result<(zmq::Socket, String)> {
-            let socket = context.socket(zmq::PUB)?;
+        let open = || -> zmq::Result<(Outlet, String)> {
+            // As PUB, and it tells what is subscribed to.
+            let socket = Outlet::new(context.socket(zmq::XPUB)?);
+            socket.bound_sending()?;
+            // So that a flood of subscriptions is held up at its connection, and not taken in
+            // before it can be counted.
+            socket.set_rcvhwm(1)?;
             lock::put_on(&socket, key, &gate.domain())?;
             socket.set_sndhwm(waiting_max)?;
             socket.set_linger(LINGER_MS)?;
@@ -411,7 +542,7 @@ impl Stand {
         match open() {
             Ok((socket, bound)) => {
                 tracing::info!(tenant = %self.tenant, plain = place == 1, endpoint = %bound, "feed");
-                self.sockets[place] = Some(socket);
+                self.sockets[place] = Some(Subscribed { socket, topics: Topics::default() });
                 self.endpoints[place] = bound;
                 self.warned = false;
             }
@@ -425,5 +556,46 @@ impl Stand {
     }
 }
 
-/// Bytes of a frame from a subscriber; a topic has 32.
+/// Bytes of a frame from a subscriber: a topic has 32, what is said at the handshake some 300.
 const SUBSCRIPTION_BYTES_MAX: i64 = 1_024;
+/// Subscriptions read before messages are sent again.
+const BURST: usize = 1_024;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_topic_is_the_beat_a_stream_or_how_one_of_them_begins() {
+        let stream = StreamKey([0xab; 16]).to_hex();
+        for topic in ["", "b", "beat", "0", "ab12", &*stream] {
+            assert!(is_published(topic.as_bytes()), "{topic}");
+        }
+        let long = format!("{stream}0");
+        for topic in ["beats", "x", "AB", "ab ", &*long] {
+            assert!(!is_published(topic.as_bytes()), "{topic}");
+        }
+    }
+
+    #[test]
+    fn each_key_has_so_many_topics_until_it_gives_some_up() {
+        let (mut topics, [ada, eve]) = (Topics::default(), [1, 2].map(|n| PublicKey([n; 32])));
+        let topic = |n: usize| format!("{n:08x}").into_bytes();
+        for n in 0..TOPICS_MAX {
+            assert!(!topics.add(&topic(n), ada));
+        }
+        assert!(!topics.add(&topic(0), ada), "known already");
+        assert!(!topics.add(&topic(TOPICS_MAX), eve));
+        topics.remove(&topic(7));
+        assert!(!topics.add(&topic(TOPICS_MAX + 1), ada));
+        assert!(topics.add(&topic(TOPICS_MAX + 2), ada));
+        let foreign = |topics: &mut Topics, n| topics.add(format!("nothing {n}").as_bytes(), eve);
+        assert!(!(0..FOREIGN_TOPICS_MAX).any(|n| foreign(&mut topics, n)));
+        assert!(foreign(&mut topics, FOREIGN_TOPICS_MAX));
+        for n in 0..=FOREIGN_TOPICS_MAX {
+            topics.remove(format!("nothing {n}").as_bytes());
+        }
+        topics.remove(&topic(TOPICS_MAX));
+        assert_eq!(topics.counts.keys().collect::<Vec<_>>(), [&ada]);
+    }
+}

@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 use super::counters::{Counters, count};
 use super::door::{Door, Incoming, Keyed, Sender};
 use super::erasures::{Asked, Erasures};
-use super::feed::{Feed, FeedDoor, Views};
+use super::feed::{Feed, FeedDoor, Views, Watch};
 use super::outbox::{Inbox, Outbox};
+use super::passes::Passes;
 use super::rights::{self, Caller};
+use super::unsent::{Parcel, Place, Unsent};
 use super::wire::{self, Refused};
 use super::zap::{Doorkeeper, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
@@ -18,6 +20,7 @@ use crate::actors::{
     Response, Submit, TenantAsk, TenantVerb, TenantView,
 };
 use crate::ids::{RequestId, TenantId, UserId};
+use crate::limits::{IN_HAND_BYTES_MAX, UNSENT_BYTES_MAX, UNSENT_CONNECTION_BYTES_MAX};
 use crate::sabotage;
 
 /// The doors: one thread that owns their ROUTERs and polls them together with the outbox of the
@@ -73,7 +76,7 @@ pub enum GatewayError {
 #[derive(Debug)]
 struct Outgoing {
     peer: Peer,
-    bytes: Vec<u8>,
+    parcel: Parcel,
 }
 
 /// Whom a message came from. Only a way back: never a proof of who they are.
@@ -84,6 +87,8 @@ struct Peer {
     routing_id: Vec<u8>,
     /// REQ sockets put an empty frame between envelope and message and want it back.
     delimiter: bool,
+    /// Whose bytes its answers count as; none: of a key that is not admitted any more.
+    tenant: Option<TenantId>,
 }
 
 /// Milliseconds after which a request that met a full gateway may be sent again.
@@ -116,24 +121,37 @@ impl Gateway {
         if let Some(LockedDoor { endpoints, key, feed: wanted }) = doors.locked {
             lock::check(zmq::has("curve"))?;
             let (seal, wake) = (Seal::fresh(), outbox.clone());
-            let admissions = registrar.admissions().clone();
+            let (admissions, passes) = (registrar.admissions().clone(), Passes::new());
             let keeper = Doorkeeper::start(
                 context,
                 seal.clone(),
                 admissions.clone(),
+                passes.clone(),
                 counters.clone(),
                 failure.clone(),
                 move || wake.wake(),
             );
             doorkeeper = Some(keeper.map_err(start)?);
-            let keyed = Keyed { key, admissions: admissions.clone(), seal };
-            let door = Door::new(context, Some(keyed))?;
+            let watch = Watch {
+                admissions: admissions.clone(),
+                seal: seal.clone(),
+                passes: passes.clone(),
+                counters: counters.clone(),
+                front: front.clone(),
+            };
+            let door = Door::new(context, Some(Keyed { key, admissions, seal, passes }))?;
             locked = door.bind(endpoints)?;
             routers.push(door);
-            let open = |wanted| Feed::open(context, wanted, key, admissions, failure.clone());
+            let open = |wanted| Feed::open(context, wanted, key, watch, failure.clone());
             feed = wanted.map(open).transpose()?;
         }
         let stopping = Arc::new(AtomicBool::new(false));
+        let packer = Packer {
+            unsent: Unsent::new(UNSENT_BYTES_MAX),
+            denials: Unsent::new(UNSENT_CONNECTION_BYTES_MAX),
+            counters: counters.clone(),
+            front: front.clone(),
+        };
         let hall = Hall {
             doors: routers,
             front,
@@ -145,6 +163,8 @@ impl Gateway {
             stopping: stopping.clone(),
             in_flight: Arc::new(AtomicUsize::new(0)),
             outbox: outbox.clone(),
+            packer,
+            in_hand: Unsent::new(IN_HAND_BYTES_MAX),
         };
         let (ready, started) = mpsc::channel();
         let thread = thread::Builder::new()
@@ -222,6 +242,36 @@ struct Hall {
     /// Requests handed to actors and not yet answered.
     in_flight: Arc<AtomicUsize>,
     outbox: Outbox<Outgoing>,
+    packer: Packer,
+    /// Bytes of requests handed to actors and not yet answered.
+    in_hand: Unsent,
+}
+
+/// Gives answers their place among those that have not left the process.
+#[derive(Clone)]
+struct Packer {
+    unsent: Unsent,
+    /// The same, for connections of keys that are not admitted any more.
+    denials: Unsent,
+    counters: Arc<Counters>,
+    front: Front,
+}
+
+impl Packer {
+    /// - returns: none when there is no room: the answer is dropped and counted. Asking again with
+    ///   the same request id is always safe.
+    fn pack(&self, peer: &Peer, bytes: Vec<u8>) -> Option<Parcel> {
+        let line = Some((peer.door, peer.routing_id.clone()));
+        let parcel = match &peer.tenant {
+            Some(tenant) => self.unsent.pack(tenant, line, bytes),
+            None => self.denials.pack(&TenantId::local(), line, bytes),
+        };
+        if parcel.is_none() {
+            count(&self.counters.unread);
+            peer.tenant.iter().for_each(|tenant| self.front.note_unread(tenant));
+        }
+        parcel
+    }
 }
 
 impl Hall {
@@ -305,7 +355,11 @@ impl Hall {
             rest.remove(0);
         }
         let own_address = self.doors[place].is_own_address(&routing_id);
-        let peer = Peer { door: place, routing_id, delimiter };
+        let tenant = match &sender {
+            Sender::Known(caller) => Some(caller.tenant()),
+            Sender::NotAdmitted(_) | Sender::Unvouched => None,
+        };
+        let peer = Peer { door: place, routing_id, delimiter, tenant };
         if too_many || rest.len() != 1 {
             // Which of the frames was meant to carry the id cannot be known.
             tracing::debug!(frames = rest.len(), "dropped a message that is not one frame");
@@ -331,7 +385,7 @@ impl Hall {
         };
         match read {
             Ok(request) => match caller.may(&request.ask) {
-                Ok(()) => self.submit(peer, caller, request),
+                Ok(()) => self.submit(peer, caller, request, rest[0].len()),
                 Err(failed) => self.deny(peer, id, failed),
             },
             Err(Refused { failed, .. }) => {
@@ -341,7 +395,8 @@ impl Hall {
         }
     }
 
-    fn submit(&self, peer: Peer, caller: Caller, request: wire::Request) {
+    /// - `bytes`: of the frame that the request was read from.
+    fn submit(&self, peer: Peer, caller: Caller, request: wire::Request, bytes: usize) {
         let wire::Request { id, user, ask } = request;
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
@@ -352,7 +407,10 @@ impl Hall {
             let none = || Response::error(ErrorCode::Unavailable, "this service has no feed");
             return self.answer(peer, id, self.feed.as_ref().map_or_else(none, view));
         }
-        let mut answer = self.answer_to(peer, id);
+        let Some(in_hand) = self.in_hand.place(&caller.tenant(), None, bytes) else {
+            return self.busy(peer, id, "the requests that the service has in hand are too large");
+        };
+        let mut answer = self.answer_to(peer, id, in_hand);
         if let Ask::Order(_) = &ask
             && let Err(response) = self.front.let_in(&caller.tenant(), &ask, &mut answer)
         {
@@ -389,13 +447,19 @@ impl Hall {
     }
 
     /// The way back for an answer that is not here yet.
-    fn answer_to(&self, peer: Peer, id: RequestId) -> AnswerTo {
+    ///
+    /// - `in_hand`: what ends with the answer.
+    fn answer_to(&self, peer: Peer, id: RequestId, in_hand: Place) -> AnswerTo {
         self.in_flight.fetch_add(1, Ordering::SeqCst);
         let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
+        let packer = self.packer.clone();
         AnswerTo::new(move |response| {
+            drop(in_hand);
             // Encoded here, by the actor's thread: the gateway's only carries.
             let bytes = wire::encode_response(id, response);
-            outbox.put(Outgoing { peer, bytes });
+            if let Some(parcel) = packer.pack(&peer, bytes) {
+                outbox.put(Outgoing { peer, parcel });
+            }
             in_flight.fetch_sub(1, Ordering::SeqCst);
         })
     }
@@ -465,17 +529,18 @@ impl Hall {
     }
 
     fn answer(&self, peer: Peer, id: RequestId, response: Response) {
-        self.send(Outgoing { peer, bytes: wire::encode_response(id, response) });
+        if let Some(parcel) = self.packer.pack(&peer, wire::encode_response(id, response)) {
+            self.send(Outgoing { peer, parcel });
+        }
     }
 
-    fn send(&self, Outgoing { peer, bytes }: Outgoing) {
+    fn send(&self, Outgoing { peer, parcel }: Outgoing) {
         let door = &self.doors[peer.door];
         let mut frames = vec![peer.routing_id];
         if peer.delimiter {
             frames.push(Vec::new());
         }
-        frames.push(bytes);
-        match door.socket.send_multipart(frames, zmq::DONTWAIT) {
+        match door.socket.send_parcel(frames, parcel) {
             Ok(()) => count(&self.counters.answered),
             // Gone, or not reading. A retry with the same id finds the answer in the log.
             Err(_) => count(&self.counters.undelivered),

@@ -10,6 +10,7 @@ use std::thread::{self, JoinHandle};
 
 use super::counters::{Counters, count};
 use super::outbox::{Inbox, Outbox};
+use super::passes::Passes;
 use super::{Context, rights};
 use crate::actors::Failure;
 use crate::ids::{PublicKey, TenantId};
@@ -63,6 +64,9 @@ impl Gate {
     }
 }
 
+/// ZAP's code of a refusal that may be over soon.
+const CROWDED: &str = "300";
+
 const SEALED_FEED: &str = "apprentice/sealed/";
 const PLAIN_FEED: &str = "apprentice/plain/";
 
@@ -82,13 +86,15 @@ impl Seal {
         Seal(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
-    fn stamp(&self, key: &PublicKey) -> String {
-        format!("{}:{key}", self.0)
+    fn stamp(&self, number: u64, key: &PublicKey) -> String {
+        format!("{}:{number}:{key}", self.0)
     }
 
-    /// The key of a connection whose handshake was answered here.
-    pub fn key_of(&self, user_id: &str) -> Option<PublicKey> {
-        user_id.strip_prefix(self.0.as_str())?.strip_prefix(':')?.parse().ok()
+    /// The number and the key of a connection whose handshake was answered here.
+    pub fn read(&self, user_id: &str) -> Option<(u64, PublicKey)> {
+        let rest = user_id.strip_prefix(self.0.as_str())?.strip_prefix(':')?;
+        let (number, key) = rest.split_once(':')?;
+        Some((number.parse().ok()?, key.parse().ok()?))
     }
 }
 
@@ -108,6 +114,7 @@ struct Desk<W: Fn()> {
     inbox: Inbox<()>,
     seal: Seal,
     admissions: Admissions,
+    passes: Passes,
     counters: Arc<Counters>,
 }
 
@@ -137,6 +144,7 @@ impl Doorkeeper {
         context: &Context,
         seal: Seal,
         admissions: Admissions,
+        passes: Passes,
         counters: Arc<Counters>,
         failure: Failure,
         wake: impl Fn() + Send + 'static,
@@ -148,7 +156,7 @@ impl Doorkeeper {
             .map_err(|error| format!("handshakes cannot be answered: {error}"))?;
         let (bell, inbox) = Outbox::new().map_err(|error| error.to_string())?;
         let guard = Guard { failure: failure.clone(), wake, told: false };
-        let mut desk = Desk { guard, socket, inbox, seal, admissions, counters };
+        let mut desk = Desk { guard, socket, inbox, seal, admissions, passes, counters };
         let thread = thread::Builder::new()
             .name("doorkeeper".to_owned())
             .spawn(move || {
@@ -214,12 +222,15 @@ impl<W: Fn()> Desk<W> {
     /// Version, request id, status code, status text, user id, metadata.
     fn answer(&self, question: &[Vec<u8>]) -> [Vec<u8>; 6] {
         let (code, text, user_id) = match self.judge(question) {
-            Ok(key) => {
+            Ok((number, key)) => {
                 count(&self.counters.handshakes);
-                ("200", "", self.seal.stamp(&key))
+                ("200", "", self.seal.stamp(number, &key))
             }
             Err((code, text)) => {
-                count(&self.counters.handshakes_denied);
+                match code {
+                    CROWDED => count(&self.counters.handshakes_crowded),
+                    _ => count(&self.counters.handshakes_denied),
+                }
                 // At debug level: a stranger must not be able to fill the operator's log.
                 tracing::debug!(code, text, "a connection was not let in");
                 (code, text, String::new())
@@ -234,7 +245,10 @@ impl<W: Fn()> Desk<W> {
     ///
     /// - errors: the status code and text. Whether a key is unknown, retired or its lab closed is
     ///   not told: a stranger must not learn which keys there are.
-    fn judge(&self, question: &[Vec<u8>]) -> Result<PublicKey, (&'static str, &'static str)> {
+    fn judge(
+        &self,
+        question: &[Vec<u8>],
+    ) -> Result<(u64, PublicKey), (&'static str, &'static str)> {
         let [version, _, domain, _, _, mechanism, key] = question else {
             return Err(("500", "not a question about a CURVE key"));
         };
@@ -244,10 +258,15 @@ impl<W: Fn()> Desk<W> {
         };
         let denied = ("400", "not admitted");
         let key = PublicKey(key.as_slice().try_into().map_err(|_| denied)?);
-        match self.admissions.admit(&key) {
-            Some(admitted) if gate.lets_in(&admitted) => Ok(key),
-            _ => Err(denied),
+        let admitted = self.admissions.admit(&key);
+        let admitted = admitted.filter(|admitted| gate.lets_in(admitted)).ok_or(denied)?;
+        let feed = gate != Gate::Door;
+        if feed && self.passes.is_cut_off(&key) {
+            return Err(denied);
         }
+        // Tried again by ZeroMQ itself, as a connection that was denied is not.
+        let number = self.passes.issue(feed, &admitted.tenant, &key);
+        number.map(|number| (number, key)).ok_or((CROWDED, "too many connections"))
     }
 }
 
@@ -265,6 +284,7 @@ mod tests {
             &context,
             Seal::fresh(),
             admissions,
+            Passes::new(),
             counters,
             failure.clone(),
             || {},
@@ -331,10 +351,10 @@ mod tests {
     fn a_user_id_that_was_not_given_here_names_nobody() {
         let (seal, other) = (Seal::fresh(), Seal::fresh());
         let key = PublicKey([9; 32]);
-        assert_eq!(seal.key_of(&seal.stamp(&key)), Some(key));
-        let forged = [other.stamp(&key), key.to_string(), format!(":{key}"), String::new()];
+        assert_eq!(seal.read(&seal.stamp(3, &key)), Some((3, key)));
+        let forged = [other.stamp(3, &key), key.to_string(), format!(":3:{key}"), String::new()];
         for user_id in forged {
-            assert_eq!(seal.key_of(&user_id), None, "{user_id}");
+            assert_eq!(seal.read(&user_id), None, "{user_id}");
         }
     }
 

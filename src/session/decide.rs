@@ -40,6 +40,8 @@ pub(super) fn decide<D: Domain>(
         (Phase::Idle, Command::Forget { lesson }) => {
             Ok(vec![forget(session, *lesson)?, retrain(session, Some(*lesson))])
         }
+        // Else whoever mistypes a name would make a person of it, for good.
+        (_, Command::Close { .. }) if session.state.opened.is_none() => Err(Rejection::NobodyThere),
         (_, Command::Close { reason }) => {
             Ok(vec![Event::SessionClosed(SessionClosed { reason: reason.clone() })])
         }

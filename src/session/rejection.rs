@@ -23,6 +23,8 @@ pub enum Rejection {
     Closed,
     #[error("the session is already open")]
     AlreadyOpen,
+    #[error("nobody of this name was recorded: there is nothing to close")]
+    NobodyThere,
     #[error("there is no utterance to teach at record {explains}; status lists what can be taught")]
     NothingToTeach { explains: Seq },
     #[error("the utterance at record {explains} was explained already")]
@@ -81,7 +83,9 @@ impl Rejection {
         match self {
             Rejection::Utterance(_) => RejectionCode::BadUtterance,
             Rejection::Stage(_) | Rejection::SceneTooLarge { .. } => RejectionCode::BadStage,
-            Rejection::WrongPhase { .. } | Rejection::AlreadyOpen => RejectionCode::WrongPhase,
+            Rejection::WrongPhase { .. } | Rejection::AlreadyOpen | Rejection::NobodyThere => {
+                RejectionCode::WrongPhase
+            }
             Rejection::StillLearning => RejectionCode::StillLearning,
             Rejection::Closed => RejectionCode::Closed,
             Rejection::NothingToTeach { .. }

@@ -2,6 +2,8 @@
 
 use super::state::Episode;
 use super::{ActionView, KnownExemplar, Session, Status, Teachable};
+use crate::ids::Digest;
+use crate::learning::{Mind, Recipe};
 use crate::world::{Domain, View};
 
 impl<D: Domain> Session<D> {
@@ -13,8 +15,11 @@ impl<D: Domain> Session<D> {
 
     /// The exemplars of the present mind, seeds first.
     pub fn known(&self) -> Vec<KnownExemplar> {
-        let exemplars = self.mind.as_ref().map(|mind| mind.exemplars()).unwrap_or_default();
-        let known = exemplars.into_iter().map(|(exemplar, lesson)| KnownExemplar {
+        self.mind.as_ref().map(|mind| self.known_to(mind)).unwrap_or_default()
+    }
+
+    fn known_to(&self, mind: &Mind) -> Vec<KnownExemplar> {
+        let known = mind.exemplars().into_iter().map(|(exemplar, lesson)| KnownExemplar {
             exemplar,
             lesson: lesson.and_then(|index| self.state.trained.get(index).copied()),
         });
@@ -23,13 +28,30 @@ impl<D: Domain> Session<D> {
 
     /// - panics: before the session was opened.
     pub fn status(&self) -> Status {
+        self.status_with(self.recipe(), self.mind_digest())
+    }
+
+    /// [`Session::status`] of a name that has no record: what its bearer would start with. It says
+    /// record 0.
+    ///
+    /// - `recipe`, `mind`: those that new people start with.
+    pub fn status_before(&self, recipe: &Recipe, mind: &Mind) -> Status {
+        self.status_with(recipe, mind.digest())
+    }
+
+    /// [`Session::known`], as [`Session::status_before`].
+    pub fn known_before(&self, mind: &Mind) -> Vec<KnownExemplar> {
+        self.known_to(mind)
+    }
+
+    fn status_with(&self, recipe: &Recipe, mind: Digest) -> Status {
         let (state, episode) = (&self.state, self.state.episode.as_ref());
         Status {
             phase: state.phase,
             seq: state.head.seq,
             episodes: state.episodes,
-            recipe: self.recipe().name().to_owned(),
-            mind: self.mind_digest(),
+            recipe: recipe.name().to_owned(),
+            mind,
             exemplars: (self.domain.seeds().exemplars.len() + state.trained.len()) as u32,
             lessons: state.lessons.len() as u32,
             goal: episode.map(|episode| episode.goal.clone()),

@@ -3,6 +3,7 @@
 use super::{AppendError, DataKey, KeyError, Keys, ReadError};
 use crate::events::Head;
 use crate::ids::StreamId;
+use crate::limits::KEY_FILE_BYTES;
 
 /// The expected-head check. (Invariant `SingleWriter`.)
 pub(super) fn head(stream: &StreamId, after: Head, found: Head) -> Result<(), AppendError> {
@@ -30,6 +31,11 @@ pub(super) fn key_to_append(
         // Not fatal for the log: the other people's keys may be in order.
         other => AppendError::Key { reason: other.to_string() },
     })
+}
+
+/// What the first record of a stream adds to its lab's bytes for the key that comes with it.
+pub(super) fn key_bytes(head: Head) -> u64 {
+    if head == Head::EMPTY { KEY_FILE_BYTES } else { 0 }
 }
 
 /// The key to read with.

@@ -42,7 +42,8 @@ pub trait EventLog: Send + Sync {
     /// - returns: the last record.
     fn walk(&self, stream: &StreamId) -> Result<Head, ReadError>;
 
-    /// Bytes of all framed records of a tenant that are durable. The first call may read all of
+    /// Bytes of all framed records of a tenant that are durable, those of its own stream too, and
+    /// [`crate::limits::KEY_FILE_BYTES`] for the key of each stream. The first call may read all of
     /// them; later ones cost nothing.
     fn sealed_bytes(&self, tenant: &TenantId) -> Result<u64, ReadError>;
 }

@@ -69,7 +69,8 @@ impl MemoryLog {
                 .or_insert_with(|| Stream { head: Head::EMPTY, frames: Vec::new() });
             kept.head = sealed.head;
             let mut bytes = self.bytes.write().expect("no append panics while it holds the count");
-            *bytes.entry(stream.tenant.clone()).or_default() += sealed.bytes();
+            *bytes.entry(stream.tenant.clone()).or_default() +=
+                sealed.bytes() + checks::key_bytes(found);
             kept.frames.extend(sealed.frames.into_iter().map(Arc::from));
         }
         Ok(Durable::mint(sealed.records, sealed.head))

@@ -142,7 +142,8 @@ impl Committer {
             };
             let sealed = draft.seal(&key, self.shared.keys.entropy(), stream.key, after);
             if !sealed.frames.is_empty() {
-                *group.bytes.entry(stream.tenant.clone()).or_default() += sealed.bytes();
+                let bytes = group.bytes.entry(stream.tenant.clone()).or_default();
+                *bytes += sealed.bytes() + checks::key_bytes(found);
                 let writes = group.writes.entry(stream.tenant.clone()).or_default();
                 for (record, frame) in sealed.records.iter().zip(&sealed.frames) {
                     for (chunk, value) in chunks(frame) {

@@ -4,6 +4,7 @@ use std::sync::{Mutex, PoisonError};
 use super::read::parse_key;
 use super::{sentence, store_error};
 use crate::ids::TenantId;
+use crate::limits::KEY_FILE_BYTES;
 use crate::store::ReadError;
 use crate::store::heads::Heads;
 use crate::store::quiet::guarded;
@@ -62,6 +63,8 @@ impl Sizes {
                 Ok(bytes + if old { value.len() as u64 } else { 0 })
             })
         });
-        counted.and_then(|counted| counted).map_err(store_error)
+        let frames = counted.and_then(|counted| counted).map_err(store_error)?;
+        let streams = heads.map_or(0, |heads| heads.len() as u64);
+        Ok(frames + streams * KEY_FILE_BYTES)
     }
 }
