@@ -5,7 +5,7 @@ use super::Growths;
 use super::life::fresh_request;
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};
-use crate::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
+use crate::ids::{IdError, Seq, StreamId, TenantId, Timestamp, UserId};
 use crate::replay::{self, CheckpointsError, Through};
 use crate::store::{AppendError, KeyError, ReadError, Store};
 use crate::tenancy::{self, Admissions, Disagreement, Order, Refusal, Registry};
@@ -24,6 +24,8 @@ pub struct Book {
 pub enum OrderError {
     #[error("tenant {tenant}: {refusal}")]
     Refused { tenant: TenantId, refusal: Refusal },
+    #[error("no new tenant can be called {tenant}: {error}")]
+    Name { tenant: TenantId, error: IdError },
     /// One key is one lab's: else nobody could say whose a message is.
     #[error("the key belongs to another tenant already; make a new one with `apprentice keys new`")]
     KeyOfOther,
@@ -110,6 +112,11 @@ impl Book {
             self.obey(tenant, &Order::Open)?;
         }
         let key_error = |error| OrderError::Key { tenant: tenant.clone(), error };
+        // A tenant that is there keeps the name that it has.
+        if *order == Order::Open && !self.registries.contains_key(tenant) {
+            let name = |error| OrderError::Name { tenant: tenant.clone(), error };
+            tenant.check_new().map_err(name)?;
+        }
         // The only order that may make a secret: records behind a lost one would be lost too.
         if *order == Order::Open && !self.registries.contains_key(tenant) {
             self.store.keys.make_tenant(tenant).map_err(key_error)?;

@@ -228,6 +228,11 @@ pub(super) fn wake<D: Domain>(
     if session.is_open() {
         return Ok(session);
     }
+    // Whoever was recorded keeps the name that they have; somebody new needs one like no other.
+    user.check_new().map_err(|error| {
+        let message = format!("nobody new can be called that: {error}");
+        Box::new(Response::error(ErrorCode::Refused, message))
+    })?;
     let command = Command::Open {
         user: user.clone(),
         recipe_text: life.recipe_text.clone(),
