@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::failure::Failure;
-use super::{data_dir, log};
+use super::{data_dir, log, shown};
 use crate::ids::{Seq, TenantId};
 use crate::store;
 
@@ -89,7 +89,7 @@ fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure
                 if let Value::Object(fields) = &mut line {
                     fields.insert("stream".to_owned(), stream.to_string().into());
                 }
-                writeln!(file, "{line}").map_err(failed)?;
+                writeln!(file, "{}", shown::json(&line)).map_err(failed)?;
                 records += 1;
             }
         }
