@@ -13,6 +13,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::limits;
+use crate::plain::{self, Hidden};
 
 /// Why a piece of text is no identifier.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -23,6 +24,12 @@ pub enum IdError {
     TooLong { what: &'static str, max: usize, found: usize },
     #[error("a {what} may not contain {found:?}; allowed are {allowed}")]
     Character { what: &'static str, found: char, allowed: &'static str },
+    #[error("a {what}: {hidden}")]
+    Hidden { what: &'static str, hidden: Hidden },
+    #[error("character {place} of a {what} is {found:?}; blanks stand inside it only, as U+0020")]
+    Blank { what: &'static str, found: char, place: usize },
+    #[error("a {what} may not begin with '-': a command would take it for an option")]
+    Option { what: &'static str },
     #[error("{found:?} is no {what}: expected {expected}")]
     Form { what: &'static str, found: String, expected: &'static str },
 }
@@ -51,6 +58,16 @@ impl TenantId {
         }
     }
 
+    /// Whether a new tenant may be called so. Older versions made tenants of more names; those stay.
+    ///
+    /// - errors: a leading hyphen.
+    pub fn check_new(&self) -> Result<(), IdError> {
+        match self.0.starts_with('-') {
+            true => Err(IdError::Option { what: "tenant" }),
+            false => Ok(()),
+        }
+    }
+
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -75,8 +92,9 @@ impl fmt::Display for TenantId {
     }
 }
 
-/// A person inside a tenant, as the tenant's gateway names them. Any printable text without
-/// control characters; it appears in no key, head or proof (see [`StreamId`]).
+/// A person inside a tenant, as the tenant's gateway names them. A text without control characters;
+/// it appears in no key, head or proof (see [`StreamId`]). Somebody new needs a name that
+/// [`UserId::check_new`] accepts, too.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct UserId(String);
@@ -90,6 +108,25 @@ impl UserId {
                 Err(IdError::Character { what: "user", found, allowed: "printable characters" })
             }
             None => Ok(UserId(text.to_owned())),
+        }
+    }
+
+    /// Whether somebody new may be called so: two names that look the same should be one. Older
+    /// versions recorded people with more names; those stay reachable.
+    ///
+    /// - errors: a [hidden](plain::check) character; white space at an end; white space other than
+    ///   U+0020.
+    pub fn check_new(&self) -> Result<(), IdError> {
+        let what = "user";
+        plain::check(&self.0).map_err(|hidden| IdError::Hidden { what, hidden })?;
+        let last = self.0.chars().count();
+        let at_an_end = |place: usize| place == 1 || place == last;
+        let blank = (1..)
+            .zip(self.0.chars())
+            .find(|&(place, c)| c.is_whitespace() && (c != ' ' || at_an_end(place)));
+        match blank {
+            Some((place, found)) => Err(IdError::Blank { what, found, place }),
+            None => Ok(()),
         }
     }
 
@@ -386,6 +423,24 @@ mod tests {
             assert!(TenantId::new(bad).is_err(), "{bad:?}");
         }
         assert_eq!(TenantId::new("lab-7").unwrap().as_str(), "lab-7");
+    }
+
+    #[test]
+    fn somebody_new_needs_a_name_that_looks_like_no_other() {
+        for good in ["ada", "Ada Lovelace", "josé", "مریم", "山田 太郎", "=1+1", "👩\u{200d}🚀"]
+        {
+            assert_eq!(UserId::new(good).unwrap().check_new(), Ok(()), "{good:?}");
+        }
+        let odd =
+            [" ada", "ada ", "ada\u{a0}", "ada\u{3000}x", "\u{feff}ada", "ad\u{200d}a", "\u{202e}"];
+        for odd in odd {
+            // It stays a name, for people who were recorded with it.
+            assert!(UserId::new(odd).unwrap().check_new().is_err(), "{odd:?}");
+        }
+        let said = UserId::new("ada\u{2028}").unwrap().check_new().unwrap_err().to_string();
+        assert!(said.starts_with("a user: character 4 is U+2028"), "{said}");
+        assert!(TenantId::new("--data").unwrap().check_new().is_err());
+        assert_eq!(TenantId::new("lab-").unwrap().check_new(), Ok(()));
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod fairness;
 pub mod ids;
 pub mod invariants;
 pub mod limits;
+pub mod plain;
 
 pub mod language;
 pub mod numerics;

@@ -6,7 +6,7 @@
 Needs Python 3.9 and the package cryptography. schema/proof.md describes every byte.
 Exit codes: 0 everything holds; 1 something does not; 2 a file or the key cannot be read.
 """
-import argparse, base64, hashlib, re, struct, sys, zlib
+import argparse, base64, hashlib, re, struct, sys, unicodedata, zlib
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
@@ -19,6 +19,11 @@ class Unreadable(Exception):  # it cannot be read: 2
 def need(holds, sentence, kind=Refused):
     if not holds:
         raise kind(sentence)
+
+def plain(text):
+    """One line: what cannot be seen, ends a line or drives a terminal is written as \\u{202e}."""
+    hidden = ("Cc", "Cf", "Cn", "Cs", "Zl", "Zp")
+    return "".join("\\u{%x}" % ord(c) if unicodedata.category(c) in hidden else c for c in text)
 
 # --- BLAKE3, for records and commitments -------------------------------------------------------
 IV = struct.unpack(">8I", bytes.fromhex(
@@ -215,13 +220,13 @@ def main():
         read = lambda path: open(path, "rb").read()
         key = arguments.key if "+" in arguments.key else read(arguments.key).decode()
         since = read(arguments.since) if arguments.since else None
-        print("\n".join(check(read(arguments.file), key, since)))
+        print("\n".join(map(plain, check(read(arguments.file), key, since))))
         return 0
     except Refused as refused:
-        print("verify.py: not proved:", refused, file=sys.stderr)
+        print("verify.py: not proved:", plain(str(refused)), file=sys.stderr)
         return 1
     except (Unreadable, OSError, ValueError) as error:
-        print("verify.py: cannot be read:", error, file=sys.stderr)
+        print("verify.py: cannot be read:", plain(str(error)), file=sys.stderr)
         return 2
 
 if __name__ == "__main__":

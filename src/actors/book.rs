@@ -4,7 +4,7 @@ use super::life::fresh_request;
 use super::{Growths, wall_clock};
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};
-use crate::ids::{Seq, StreamId, TenantId, UserId};
+use crate::ids::{IdError, Seq, StreamId, TenantId, UserId};
 use crate::replay::{self, CheckpointsError, Through};
 use crate::store::{AppendError, KeyError, ReadError, Store};
 use crate::tenancy::{self, Admissions, Clock, Disagreement, Order, Refusal, Registry};
@@ -23,6 +23,8 @@ pub struct Book {
 pub enum OrderError {
     #[error("tenant {tenant}: {refusal}")]
     Refused { tenant: TenantId, refusal: Refusal },
+    #[error("no new tenant can be called {tenant}: {error}")]
+    Name { tenant: TenantId, error: IdError },
     /// One key is one lab's: else nobody could say whose a message is.
     #[error("the key belongs to another tenant already; make a new one with `apprentice keys new`")]
     KeyOfOther,
@@ -128,6 +130,11 @@ impl Book {
             self.obey(tenant, &Order::Open)?;
         }
         let key_error = |error| OrderError::Key { tenant: tenant.clone(), error };
+        // A tenant that is there keeps the name that it has.
+        if *order == Order::Open && !self.registries.contains_key(tenant) {
+            let name = |error| OrderError::Name { tenant: tenant.clone(), error };
+            tenant.check_new().map_err(name)?;
+        }
         // The only order that may make a secret: records behind a lost one would be lost too.
         if *order == Order::Open && !self.registries.contains_key(tenant) {
             self.store.keys.make_tenant(tenant).map_err(key_error)?;

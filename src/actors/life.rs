@@ -237,18 +237,26 @@ pub(super) fn wake<D: Domain>(
 
 /// The turn that opens the session of somebody new.
 ///
-/// - errors: why there is none.
+/// - errors: what to answer instead.
 pub(super) fn open<D: Domain>(
     life: &Life<D>,
     session: &Session<D>,
     user: &UserId,
-) -> Result<Turn, Rejection> {
+) -> Result<Turn, Box<Response>> {
+    // People who were recorded keep the name that they have; somebody new needs one like no other.
+    user.check_new().map_err(|error| {
+        let message = format!("nobody new can be called that: {error}");
+        Box::new(Response::error(ErrorCode::Refused, message))
+    })?;
     let command = Command::Open {
         user: user.clone(),
         recipe_text: life.recipe_text.clone(),
         mind: life.base.digest(),
     };
-    match session.propose(&command, fresh_request(), session.next_at(life.now()))? {
+    let proposed = session.propose(&command, fresh_request(), session.next_at(life.now()));
+    match proposed.map_err(|rejection| {
+        Box::new(Response::error(ErrorCode::Unavailable, rejection.to_string()))
+    })? {
         Proposed::Turn(turn) => Ok(turn),
         Proposed::Repeat { .. } => unreachable!("a fresh request id was not answered before"),
     }

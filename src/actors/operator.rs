@@ -111,6 +111,7 @@ impl From<OrderError> for Response {
                 Response::busy(message, RETRY_BUSY_MS)
             }
             OrderError::Refused { .. }
+            | OrderError::Name { .. }
             | OrderError::KeyOfOther
             | OrderError::NobodyThere { .. } => Response::error(ErrorCode::Refused, message),
             OrderError::Append { .. }

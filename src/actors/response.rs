@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::archive::{ArchiveAsk, Heads, PlainRecords, SealedRecords};
 use super::operator::{ErasedView, Ordered, TenantAsk, TenantView};
 use crate::ids::RequestId;
+use crate::plain;
 use crate::session::{
     Command, KnownExemplar, Query, Rejection, RejectionCode, Reply, Status, Told,
 };
@@ -146,7 +147,8 @@ pub enum ErrorCode {
     InternalVerb,
     /// Whoever asks may not ask this.
     Denied,
-    /// An order that does not fit the tenant as it stands; nothing was recorded.
+    /// An order that does not fit the tenant as it stands, or a name that nobody new may have;
+    /// nothing was recorded.
     Refused,
     /// This person's stream cannot be read or written now; an operator must look.
     Unavailable,
@@ -160,12 +162,15 @@ impl Response {
     }
 
     pub fn error(code: ErrorCode, message: impl Into<String>) -> Response {
-        Response::Error(Failed { code, message: message.into() })
+        let message = plain::escape_lines(&message.into()).into_owned();
+        Response::Error(Failed { code, message })
     }
 }
 
 impl From<Rejection> for Response {
     fn from(rejection: Rejection) -> Response {
-        Response::Rejected(Rejected { code: rejection.code(), message: rejection.to_string() })
+        // It may quote what the person sent.
+        let message = plain::escape(&rejection.to_string()).into_owned();
+        Response::Rejected(Rejected { code: rejection.code(), message })
     }
 }

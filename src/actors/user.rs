@@ -205,8 +205,8 @@ impl<D: Domain> UserActor<D> {
         let Stage::Awake(session) = &self.stage else { return Self::done() };
         let Turn { after, batch } = match life::open(&self.life, session, &self.waking.user) {
             Ok(turn) => turn,
-            Err(rejection) => {
-                respond(answer, Response::error(ErrorCode::Unavailable, rejection.to_string()));
+            Err(response) => {
+                respond(answer, *response);
                 return Self::done();
             }
         };

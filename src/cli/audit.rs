@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::bar::Bar;
 use super::failure::Failure;
-use super::{past, terminal::count};
+use super::{past, shown, terminal::count};
 use crate::ids::{StreamKey, TenantId};
 use crate::replay::{self, AuditReport, Counts, Scrutiny, StreamReport};
 use crate::world::household::Household;
@@ -62,10 +62,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let report = replay::audit(&domain, &past.store, &streams, scrutiny, threads, &bar);
     bar.finish();
     let text = match arguments.json {
-        true => {
-            let text = serde_json::to_string_pretty(&report);
-            text.expect("a report has text keys and whole numbers") + "\n"
-        }
+        true => shown::json_pretty(&report) + "\n",
         false => readable(&report, scrutiny),
     };
     let mut stdout = std::io::stdout().lock();
@@ -80,8 +77,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 
 fn readable(report: &AuditReport, scrutiny: Scrutiny) -> String {
     let lines = report.streams.iter().flat_map(stream_lines);
-    let lines: Vec<String> = lines.chain(count_lines(&report.counts, scrutiny)).collect();
-    lines.join("\n") + "\n"
+    shown::lines(lines.chain(count_lines(&report.counts, scrutiny)))
 }
 
 fn stream_lines(stream: &StreamReport) -> Vec<String> {

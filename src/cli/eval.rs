@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::bar::Bar;
 use super::failure::Failure;
-use super::recipe;
+use super::{recipe, shown};
 use crate::learning::Recipe;
+use crate::plain;
 use crate::study::ablation::{Ablation, Variant, ablate};
 use crate::study::corpus::{BadLine, Corpus};
 use crate::study::goals::goals;
@@ -171,12 +172,14 @@ fn printed<R: Serialize + std::fmt::Display>(
 ) -> String {
     if !arguments.json {
         return match bad_lines {
-            0 => report.to_string(),
-            count => format!("{report}\n{count} bad lines in the corpus\n"),
+            0 => plain::escape_lines(&report.to_string()).into_owned(),
+            count => {
+                let report = format!("{report}\n{count} bad lines in the corpus\n");
+                plain::escape_lines(&report).into_owned()
+            }
         };
     }
-    let object = serde_json::to_string_pretty(&WithCorpus { report, bad_lines });
-    object.expect("reports have text keys and finite numbers") + "\n"
+    shown::json_pretty(&WithCorpus { report, bad_lines }) + "\n"
 }
 
 /// Shows the first bad lines of a corpus on standard error.
@@ -187,6 +190,7 @@ pub fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
         return Err(Failure::bad_input(format!("line {line} of the corpus is bad: {reason}")));
     }
     for BadLine { line, reason } in bad.iter().take(BAD_LINES_SHOWN) {
+        let reason = plain::escape(reason);
         eprintln!("apprentice: line {line} of the corpus is left out: {reason}");
     }
     if bad.len() > BAD_LINES_SHOWN {

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::failure::Failure;
-use super::{data_dir, log};
+use super::{data_dir, log, shown};
 use crate::ids::{Seq, TenantId};
 use crate::store;
 
@@ -89,7 +89,7 @@ fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure
                 if let Value::Object(fields) = &mut line {
                     fields.insert("stream".to_owned(), stream.to_string().into());
                 }
-                writeln!(file, "{}", one_line(&line)).map_err(failed)?;
+                writeln!(file, "{}", shown::json(&line)).map_err(failed)?;
                 records += 1;
             }
         }
@@ -105,31 +105,4 @@ fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure
         eprintln!("apprentice: {erased} people were erased and are not in it");
     }
     Ok(())
-}
-
-/// The value as one line for every reader: some take these three characters, which JSON leaves as they
-/// are, for the end of a line. They stand inside of texts only.
-fn one_line(value: &Value) -> String {
-    let text = value.to_string();
-    match text.contains(['\u{85}', '\u{2028}', '\u{2029}']) {
-        false => text,
-        true => text
-            .replace('\u{85}', "\\u0085")
-            .replace('\u{2028}', "\\u2028")
-            .replace('\u{2029}', "\\u2029"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_text_ends_a_line_before_its_end() {
-        let said = Value::from("a\u{2028}b\u{2029}c\u{85}d\ne\\u2028 \u{1f916}");
-        let line = one_line(&said);
-        assert!(!line.contains(['\u{2028}', '\u{2029}', '\u{85}', '\n']), "{line}");
-        assert_eq!(serde_json::from_str::<Value>(&line).unwrap(), said);
-        assert_eq!(one_line(&Value::from("plain")), "\"plain\"");
-    }
 }

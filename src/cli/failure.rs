@@ -1,6 +1,8 @@
 use std::fmt;
 use std::process::ExitCode;
 
+use crate::plain;
+
 /// Why the program ends with another code than 0: the code and, where one is left to say, one
 /// sentence for standard error.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +30,8 @@ impl Failure {
     /// Prints the sentence and gives the code.
     pub fn report(self) -> ExitCode {
         if let Some(sentence) = &self.sentence {
+            // Further lines are indented: none of them looks like another message.
+            let sentence = plain::escape_lines(sentence).replace('\n', "\n  ");
             eprintln!("apprentice: {sentence}");
         }
         ExitCode::from(self.code)

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use super::embedded;
 use super::failure::Failure;
 use super::passport::Passport;
+use super::shown;
 use crate::frontends::{Followed, Follower, Position};
 use crate::ids::{Seq, StreamKey, WithinTenant};
 
@@ -104,7 +105,7 @@ fn show(followed: &Followed, as_json: bool) -> io::Result<()> {
             let (stream, digest) = (record.stream.to_hex(), record.digest.to_hex());
             let seq = record.seq.get();
             let line = json!({"stream": stream, "seq": seq, "digest": digest, "frame": frame});
-            writeln!(out, "{line}")?;
+            writeln!(out, "{}", shown::json(&line))?;
         }
         (Followed::Sealed(record), false) => {
             let (stream, seq, digest) = (record.stream, record.seq, record.digest.short());
@@ -113,11 +114,13 @@ fn show(followed: &Followed, as_json: bool) -> io::Result<()> {
         }
         (Followed::Plain(record), true) => {
             let line = serde_json::to_value(record).unwrap_or(Value::Null);
-            writeln!(out, "{line}")?;
+            writeln!(out, "{}", shown::json(&line))?;
         }
         (Followed::Plain(record), false) => {
             let (stream, seq, kind) = (record.stream, record.seq, &record.kind);
-            writeln!(out, "{stream} {seq:>6}  {kind:<21}  {}", record.event)?;
+            let event = shown::json(&record.event);
+            let line = format!("{stream} {seq:>6}  {kind:<21}  {event}");
+            out.write_all(shown::lines([line]).as_bytes())?;
         }
         (Followed::Erased { stream, last }, true) => {
             let line = json!({"stream": stream.to_hex(), "seq": last.seq.get(), "erased": true});

@@ -27,6 +27,7 @@ mod replay;
 mod salvage;
 mod self_test;
 mod serve;
+mod shown;
 mod study;
 mod talk;
 mod tenant;

@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::data_dir;
 use super::failure::Failure;
+use super::shown;
 use crate::ids::TenantId;
 use crate::store::{self, Salvaged, Share};
 
@@ -39,14 +40,12 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let lost = losses(&salvaged);
     let kept: u64 = salvaged.streams.iter().map(|found| found.valid.seq).sum();
     match arguments.json {
-        true => println!("{}", as_json(&salvaged, kept)),
+        true => println!("{}", shown::json(&as_json(&salvaged, kept))),
         false => {
-            for sentence in &lost {
-                println!("lost: {sentence}");
-            }
-            for (tenant, share) in salvaged.by_tenant() {
-                println!("{}", of_tenant(tenant, &share));
-            }
+            print!("{}", shown::lines(lost.iter().map(|sentence| format!("lost: {sentence}"))));
+            let shares = salvaged.by_tenant();
+            let shares = shares.iter().map(|(tenant, share)| of_tenant(tenant, share));
+            print!("{}", shown::lines(shares));
             let people = salvaged.streams.iter().filter(|found| !found.stream.is_tenants());
             let people = people.filter(|found| found.valid.seq > 0).count();
             println!("kept: {kept} records of {people} people");

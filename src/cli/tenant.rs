@@ -6,6 +6,7 @@ use super::failure::Failure;
 use super::log::utc;
 use super::office::{Office, Place};
 use super::overlap;
+use super::shown;
 use crate::actors::TenantView;
 use crate::frontends::{read_public, show_key};
 use crate::ids::{PublicKey, TenantId};
@@ -238,7 +239,9 @@ fn show(view: &TenantView) {
     let TenantView { tenant, disabled, quotas, keys } = view;
     match disabled {
         None => println!("{tenant}: {quotas}"),
-        Some(reason) => println!("{tenant}: DISABLED ({reason:?}); {quotas}"),
+        Some(reason) => {
+            print!("{}", shown::lines([format!("{tenant}: DISABLED ({reason:?}); {quotas}")]));
+        }
     }
     for known in keys {
         let until = match (known.retired, known.valid_until) {
@@ -248,7 +251,9 @@ fn show(view: &TenantView) {
             (false, Some(until)) => format!(" until {}, then retired", utc(until)),
         };
         let (key, role, label) = (show_key(&known.key), known.role, &known.label);
-        println!("  {role:<8}  {key}  since {}{until}  {label:?}", utc(known.admitted_at));
+        let since = utc(known.admitted_at);
+        let line = format!("  {role:<8}  {key}  since {since}{until}  {label:?}");
+        print!("{}", shown::lines([line]));
     }
 }
 

@@ -5,7 +5,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::failure::Failure;
-use super::log;
+use super::{log, shown};
 use crate::events::{Record, decode};
 use crate::evidence::{self, Proof, Verified, VerifiedRecord, VerifierKey};
 
@@ -50,11 +50,11 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let since = since.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let verified = evidence::verify(&proof, &key, since.as_deref());
     let text = match (&verified, arguments.json) {
-        (Ok(verified), true) => format!("{}\n", as_json(verified)),
+        (Ok(verified), true) => shown::json(&as_json(verified)) + "\n",
         (Err(error), true) => {
-            format!("{}\n", json!({ "verified": false, "reason": error.to_string() }))
+            shown::json(&json!({ "verified": false, "reason": error.to_string() })) + "\n"
         }
-        (Ok(verified), false) => readable(verified).join("\n") + "\n",
+        (Ok(verified), false) => shown::lines(readable(verified)),
         (Err(_), false) => String::new(),
     };
     let mut stdout = std::io::stdout().lock();

@@ -13,6 +13,7 @@ use crate::actors::{
 };
 use crate::ids::{RequestId, Seq, StreamKey, TenantId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
+use crate::plain;
 use crate::session::{Command, KnownExemplar, Query, Reply, Status};
 use crate::world::View;
 
@@ -202,7 +203,8 @@ pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
     let id = unpack::<IdField>(bytes).map(|field| field.id);
     let refuse = |code, message: String| Refused {
         id: id.as_ref().ok().copied(),
-        failed: Failed { code, message },
+        // It may quote what a stranger sent.
+        failed: Failed { code, message: plain::escape(&message).into_owned() },
     };
     if bytes.len() > FRAME_BYTES_MAX {
         let found = bytes.len();

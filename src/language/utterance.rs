@@ -3,6 +3,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::limits::{UTTERANCE_BYTES_MAX, UTTERANCE_WORDS_MAX};
+use crate::plain::{self, Hidden};
 
 /// What a person typed, checked but otherwise untouched.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -20,16 +21,34 @@ pub enum UtteranceError {
     TooManyBytes { found: usize },
     #[error("that has {found} words; at most {UTTERANCE_WORDS_MAX} are read, so say it in parts")]
     TooManyWords { found: usize },
-    #[error("that contains the control character {found:?}; type plain text")]
-    Control { found: char },
+    #[error("in that, {0}")]
+    Hidden(Hidden),
 }
 
 impl Utterance {
-    /// White space around the text is dropped, tabs count as blanks.
+    /// What somebody says now. White space around the text is dropped, tabs count as blanks.
     ///
-    /// - errors: empty, without a single word, too long in bytes or words, or with a control
-    ///   character.
+    /// - errors: empty, without a single word, too long in bytes or words, or with a
+    ///   [hidden](plain::check) character.
     pub fn new(text: &str) -> Result<Utterance, UtteranceError> {
+        Utterance::admit(text, plain::check)
+    }
+
+    /// What was recorded. Older versions refused control characters alone, and their records stay
+    /// what they are.
+    ///
+    /// - errors: as [`Utterance::new`], and of the hidden characters those that control.
+    pub fn recorded(text: &str) -> Result<Utterance, UtteranceError> {
+        Utterance::admit(text, |text| match (1..).zip(text.chars()).find(|(_, c)| c.is_control()) {
+            Some((place, found)) => Err(Hidden { found, place }),
+            None => Ok(()),
+        })
+    }
+
+    fn admit(
+        text: &str,
+        check: impl Fn(&str) -> Result<(), Hidden>,
+    ) -> Result<Utterance, UtteranceError> {
         if text.len() > UTTERANCE_BYTES_MAX {
             return Err(UtteranceError::TooManyBytes { found: text.len() });
         }
@@ -37,9 +56,7 @@ impl Utterance {
         if text.is_empty() {
             return Err(UtteranceError::Empty);
         }
-        if let Some(found) = text.chars().find(|c| c.is_control()) {
-            return Err(UtteranceError::Control { found });
-        }
+        check(&text).map_err(UtteranceError::Hidden)?;
         let words = tokens(&text).iter().filter(|token| is_word(token)).count();
         match words {
             0 => Err(UtteranceError::NoWords),
@@ -61,7 +78,7 @@ impl Utterance {
 impl TryFrom<String> for Utterance {
     type Error = UtteranceError;
     fn try_from(text: String) -> Result<Utterance, UtteranceError> {
-        Utterance::new(&text)
+        Utterance::recorded(&text)
     }
 }
 
@@ -126,11 +143,16 @@ mod tests {
     fn bad_utterances_get_one_clear_sentence() {
         assert_eq!(Utterance::new("  "), Err(UtteranceError::Empty));
         assert_eq!(Utterance::new("🤖 !!"), Err(UtteranceError::NoWords));
-        assert!(matches!(Utterance::new("a\u{0}b"), Err(UtteranceError::Control { .. })));
+        let hidden = |found, place| Err(UtteranceError::Hidden(Hidden { found, place }));
+        assert_eq!(Utterance::new("a\u{0}b"), hidden('\0', 2));
+        assert_eq!(Utterance::new("pick\u{202e}up"), hidden('\u{202e}', 5));
         let long = "go ".repeat(10_000);
         assert!(matches!(Utterance::new(&long), Err(UtteranceError::TooManyBytes { .. })));
         let wordy = "go ".repeat(200);
         assert!(matches!(Utterance::new(&wordy), Err(UtteranceError::TooManyWords { found: 200 })));
         assert!(Utterance::new("wash the <b>mug</b> 🍵").is_ok());
+        // Recorded by older versions, and read for ever.
+        assert!(Utterance::recorded("pick\u{202e}up").is_ok());
+        assert_eq!(Utterance::recorded("a\u{1b}b"), hidden('\u{1b}', 2));
     }
 }

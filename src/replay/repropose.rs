@@ -60,7 +60,7 @@ pub(super) fn compare<D: Domain>(
     let first = batch.first()?;
     let kinds = || batch.iter().map(|record| format!("{:?}", record.event.kind()));
     let recorded = || kinds().collect::<Vec<_>>().join(", ");
-    let events = match session.propose(command, first.request, first.at) {
+    let events = match session.propose_recorded(command, first.request, first.at) {
         Ok(Proposed::Turn(turn)) => turn.batch.events,
         Ok(Proposed::Repeat { first: old, .. }) => {
             let field = "request";

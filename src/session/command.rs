@@ -1,7 +1,11 @@
 use serde::{Deserialize, Serialize};
 
+use super::Rejection;
 use crate::events::Report;
 use crate::ids::{Digest, Seq, UserId};
+use crate::language::UtteranceError;
+use crate::limits::UTTERANCE_BYTES_MAX;
+use crate::plain;
 use crate::world::Stage;
 
 /// A wish that may be refused. What people send is `StartEpisode` to `Close`; `Open` and
@@ -37,7 +41,7 @@ pub enum Command {
     Forget {
         lesson: Seq,
     },
-    /// Withdraw for good.
+    /// Withdraw for good. The reason may be empty: nobody owes one.
     Close {
         reason: String,
     },
@@ -74,6 +78,39 @@ pub enum Query {
 }
 
 impl Command {
+    /// Whether the texts of the command are ones that may be said now. Older versions recorded more;
+    /// deciding a recorded command again does not ask.
+    ///
+    /// - errors: a [hidden](plain::check) character, or a reason that is too long.
+    pub(super) fn check_texts(&self) -> Result<(), Rejection> {
+        let stage = |what, hidden| Rejection::StageText { what, hidden };
+        match self {
+            Command::Say { utterance } => {
+                // As an utterance is read: without the white space around it, tabs as blanks.
+                let text = utterance.trim().replace('\t', " ");
+                plain::check(&text).map_err(|hidden| UtteranceError::Hidden(hidden).into())
+            }
+            Command::StartEpisode { stage: Stage::Seed { .. } } => Ok(()),
+            Command::StartEpisode { stage: Stage::Task { task, .. } } => {
+                plain::check(task).map_err(|hidden| stage("task", hidden))
+            }
+            Command::StartEpisode { stage: Stage::Scene { scene, task } } => {
+                plain::check(task).map_err(|hidden| stage("task", hidden))?;
+                plain::check_lines(scene).map_err(|hidden| stage("scene", hidden))
+            }
+            Command::Close { reason } if reason.len() > UTTERANCE_BYTES_MAX => {
+                Err(Rejection::ReasonTooLong { found: reason.len() })
+            }
+            Command::Close { reason } => plain::check(reason).map_err(Rejection::Reason),
+            Command::Open { .. }
+            | Command::Done
+            | Command::Teach { .. }
+            | Command::FinishTeaching
+            | Command::Forget { .. }
+            | Command::FinishRetrain { .. } => Ok(()),
+        }
+    }
+
     /// The verb as people type it.
     pub fn name(&self) -> &'static str {
         match self {

@@ -101,7 +101,8 @@ fn start<D: Domain>(session: &Session<D>, stage: &Stage) -> Result<Vec<Event>, R
 }
 
 fn say<D: Domain>(session: &Session<D>, text: &str) -> Result<Vec<Event>, Rejection> {
-    let utterance = Utterance::new(text)?;
+    // Of what is said now, `Session::propose` has checked more.
+    let utterance = Utterance::recorded(text)?;
     let (domain, episode) = (&*session.domain, episode(&session.state));
     if episode.utterances as usize >= EPISODE_UTTERANCES_MAX
         || episode.actions.len() >= EPISODE_ACTIONS_MAX

@@ -79,9 +79,31 @@ impl<D: Domain> Session<D> {
         request: RequestId,
         at: Timestamp,
     ) -> Result<Proposed, Rejection> {
+        self.answer(command, request, at, Command::check_texts)
+    }
+
+    /// Decides a recorded command again, as [`Session::propose`] would have: the rule for texts that
+    /// are said now is not held against what was said before it.
+    pub fn propose_recorded(
+        &self,
+        command: &Command,
+        request: RequestId,
+        at: Timestamp,
+    ) -> Result<Proposed, Rejection> {
+        self.answer(command, request, at, |_| Ok(()))
+    }
+
+    fn answer(
+        &self,
+        command: &Command,
+        request: RequestId,
+        at: Timestamp,
+        check: impl Fn(&Command) -> Result<(), Rejection>,
+    ) -> Result<Proposed, Rejection> {
         if let Some(answered) = self.state.requests.find(request) {
             return Ok(Proposed::Repeat { first: answered.first, last: answered.last });
         }
+        check(command)?;
         let events = decide::decide(self, command)?;
         let batch = Batch { request, at, events };
         Ok(Proposed::Turn(Turn { after: self.head(), batch }))

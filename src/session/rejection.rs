@@ -5,7 +5,9 @@ use crate::ids::Seq;
 use crate::language::{LiftedProgram, LiftedUtterance, UtteranceError};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
+    UTTERANCE_BYTES_MAX,
 };
+use crate::plain::Hidden;
 use crate::world::StageError;
 
 /// Why a command was declined. Normal; nothing was recorded. The text is for the person who asked.
@@ -15,6 +17,12 @@ pub enum Rejection {
     Utterance(#[from] UtteranceError),
     #[error(transparent)]
     Stage(#[from] StageError),
+    #[error("in the {what}, {hidden}")]
+    StageText { what: &'static str, hidden: Hidden },
+    #[error("in the reason, {0}")]
+    Reason(Hidden),
+    #[error("the reason has {found} bytes; at most {UTTERANCE_BYTES_MAX} are recorded")]
+    ReasonTooLong { found: usize },
     #[error("{command} is not possible {}; {}", phase_words(*phase), way_out(*phase))]
     WrongPhase { command: &'static str, phase: Phase },
     #[error("still learning from the last lessons; try again in a moment")]
@@ -68,6 +76,8 @@ pub enum Rejection {
 pub enum RejectionCode {
     BadUtterance,
     BadStage,
+    /// A free text that is neither an utterance nor of a stage: the reason of `close`.
+    BadText,
     WrongPhase,
     StillLearning,
     Closed,
@@ -82,7 +92,10 @@ impl Rejection {
     pub fn code(&self) -> RejectionCode {
         match self {
             Rejection::Utterance(_) => RejectionCode::BadUtterance,
-            Rejection::Stage(_) | Rejection::SceneTooLarge { .. } => RejectionCode::BadStage,
+            Rejection::Stage(_) | Rejection::StageText { .. } | Rejection::SceneTooLarge { .. } => {
+                RejectionCode::BadStage
+            }
+            Rejection::Reason(_) | Rejection::ReasonTooLong { .. } => RejectionCode::BadText,
             Rejection::WrongPhase { .. } | Rejection::AlreadyOpen | Rejection::NobodyThere => {
                 RejectionCode::WrongPhase
             }

@@ -140,7 +140,8 @@ impl Corpus {
         if line.user.trim().is_empty() {
             return Err("its user is empty".to_owned());
         }
-        UserId::new(&line.user).map_err(|error| error.to_string())?;
+        let user = UserId::new(&line.user);
+        user.and_then(|user| user.check_new()).map_err(|error| error.to_string())?;
         let room = room(line.scene).ok_or_else(|| {
             format!(
                 "scene {} is in no room; kitchens are 1–30, living rooms 201–230, bedrooms \

@@ -5,6 +5,7 @@
 //! corpus knows is for judging the answer.
 
 pub mod ablation;
+mod cells;
 pub mod corpus;
 mod draw;
 mod episode;

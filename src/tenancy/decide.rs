@@ -5,6 +5,7 @@ use crate::events::{
 };
 use crate::ids::{PublicKey, Seq, StreamKey, Timestamp};
 use crate::limits::{LABEL_BYTES_MAX, OVERLAP_S_MAX, TENANT_KEYS_MAX};
+use crate::plain::{self, Hidden};
 
 /// Why an order is not carried out. Nothing was recorded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -28,6 +29,8 @@ pub enum Refusal {
     TooManyKeys { max: usize },
     #[error("a {what} has at most {max} bytes, this one has {found}")]
     TooLong { what: &'static str, max: usize, found: usize },
+    #[error("in the {what}, {hidden}")]
+    Hidden { what: &'static str, hidden: Hidden },
     #[error("a quota of 0 {what} would let nobody in; disable the tenant instead")]
     NothingAllowed { what: &'static str },
     #[error("the segment begins at record {found}, but {wanted} is the first that none covers")]
@@ -53,13 +56,16 @@ pub fn decide(registry: &Registry, order: &Order, wall: Timestamp) -> Result<Vec
     }
     events.extend(match order {
         Order::Open => vec![],
-        Order::Admit { key, role, label } => admit(registry, *key, *role, label, wall)?,
+        Order::Admit { key, role, label } => {
+            check_text("label", label)?;
+            admit(registry, *key, *role, label, wall)?
+        }
         Order::Retire { key, overlap_seconds } => retire(registry, *key, *overlap_seconds, wall)?,
         Order::Rotate { old, new, overlap_seconds } => {
             rotate(registry, *old, *new, *overlap_seconds, wall)?
         }
         Order::Disable { reason } => {
-            within("reason", LABEL_BYTES_MAX, reason)?;
+            check_text("reason", reason)?;
             match registry.standing().disabled() {
                 Some(_) => vec![],
                 None => vec![TenantDisabled { reason: reason.clone() }.into()],
@@ -131,7 +137,6 @@ fn admit(
     label: &str,
     wall: Timestamp,
 ) -> Result<Vec<Event>, Refusal> {
-    within("label", LABEL_BYTES_MAX, label)?;
     match registry.standing().keys().get(&key) {
         Some(known) if !known.is_good(wall) => Err(Refusal::Retired { key }),
         Some(known) if known.role != role => {
@@ -183,6 +188,7 @@ fn rotate(
             _ => Err(Refusal::Retired { key: old }),
         };
     }
+    // The label was checked by the rule of its time.
     let mut events = admit(registry, new, known.role, &known.label, wall)?;
     events.extend(retire(registry, old, overlap_seconds, wall)?);
     Ok(events)
@@ -195,11 +201,12 @@ fn persons(stream: StreamKey) -> Result<(), Refusal> {
     }
 }
 
-fn within(what: &'static str, max: usize, text: &str) -> Result<(), Refusal> {
-    match text.len() > max {
-        true => Err(Refusal::TooLong { what, max, found: text.len() }),
-        false => Ok(()),
+/// A free text of an operator.
+fn check_text(what: &'static str, text: &str) -> Result<(), Refusal> {
+    if text.len() > LABEL_BYTES_MAX {
+        return Err(Refusal::TooLong { what, max: LABEL_BYTES_MAX, found: text.len() });
     }
+    plain::check(text).map_err(|hidden| Refusal::Hidden { what, hidden })
 }
 
 #[cfg(test)]
@@ -312,6 +319,11 @@ mod tests {
         assert!(refused(same).contains("by itself"));
         let long = Order::Disable { reason: "x".repeat(LABEL_BYTES_MAX + 1) };
         assert!(refused(long).contains("at most"));
+        let forged = Order::Disable { reason: "unpaid\nlab: enabled".to_owned() };
+        assert!(refused(forged).starts_with("in the reason, character 7 is U+000A"));
+        let label = "door\u{202e}".to_owned();
+        let forged = Order::Admit { key: B, role: Role::Auditor, label };
+        assert!(refused(forged).starts_with("in the label, character 5 is U+202E"));
         let nothing = Quotas { in_flight: Some(0), ..Quotas::default() };
         assert!(refused(Order::SetQuotas(nothing)).contains("disable the tenant"));
     }

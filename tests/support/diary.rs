@@ -37,11 +37,24 @@ impl<D: Domain> Diary<D> {
     }
 
     pub fn give(&mut self, command: &Command) -> Result<Reply, Rejection> {
+        self.decided_by(Session::propose, command)
+    }
+
+    /// As older versions took it, which let more characters in.
+    pub fn give_as_of_old(&mut self, command: &Command) -> Result<Reply, Rejection> {
+        self.decided_by(Session::propose_recorded, command)
+    }
+
+    fn decided_by(
+        &mut self,
+        propose: fn(&Session<D>, &Command, RequestId, Timestamp) -> Result<Proposed, Rejection>,
+        command: &Command,
+    ) -> Result<Reply, Rejection> {
         self.requests += 1;
         let mut request = [0; 16];
         request[..8].copy_from_slice(&self.requests.to_be_bytes());
         let at = self.session.next_at(Timestamp(1_000));
-        let turn = match self.session.propose(command, RequestId(request), at)? {
+        let turn = match propose(&self.session, command, RequestId(request), at)? {
             Proposed::Turn(turn) => turn,
             Proposed::Repeat { .. } => panic!("a fresh request id was answered before"),
         };

@@ -21,16 +21,28 @@ impl Budget {
         toml::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
     }
 
-    /// - errors: the stage has no budget, or took longer than it.
-    pub fn check(&self, stage: &str, seconds: u64) -> Result<(), String> {
+    /// - returns: a sentence, when the stage took longer than its budget.
+    /// - errors: the stage has no budget.
+    pub fn exceeded(&self, stage: &str, seconds: u64) -> Result<Option<String>, String> {
         let allowed = self.seconds.get(stage).copied();
         let allowed =
             allowed.ok_or_else(|| format!("stage {stage} has no line in xtask/budget.toml"))?;
-        match seconds <= allowed {
-            true => Ok(()),
-            false => Err(format!(
-                "stage {stage} took {seconds} s, its budget is {allowed} s (xtask/budget.toml)"
-            )),
-        }
+        Ok((seconds > allowed).then(|| {
+            format!("stage {stage} took {seconds} s, its budget is {allowed} s (xtask/budget.toml)")
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stage_over_its_budget_is_named_and_one_without_a_budget_is_an_error() {
+        let budget: Budget = toml::from_str("[seconds]\ntest = 60\n").unwrap();
+        assert_eq!(budget.exceeded("test", 60), Ok(None));
+        let sentence = budget.exceeded("test", 61).unwrap().unwrap();
+        assert_eq!(sentence, "stage test took 61 s, its budget is 60 s (xtask/budget.toml)");
+        assert!(budget.exceeded("docs", 1).unwrap_err().contains("no line"));
     }
 }

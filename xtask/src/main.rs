@@ -24,6 +24,9 @@ enum Task {
         /// Run only the stages with these names.
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
+        /// Fail at a stage that takes longer than xtask/budget.toml allows, instead of warning.
+        #[arg(long)]
+        enforce_budget: bool,
     },
     /// The simulator: as many seeds as wanted, in the release build.
     ///
@@ -88,7 +91,7 @@ enum Task {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
-        Task::Test { only } => stage::run_all(&only),
+        Task::Test { only, enforce_budget } => stage::run_all(&only, enforce_budget),
         Task::Simulate { seeds, seed } => drills::simulate(seeds.unwrap_or(1), seed),
         Task::Crash { kills, seed } => drills::crash(kills, seed),
         Task::Powerloss { images, seed } => drills::powerloss(images, seed),

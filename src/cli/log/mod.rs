@@ -10,6 +10,7 @@ use clap::{Args, Subcommand};
 
 use super::failure::Failure;
 use super::past::{OfOne, Whose};
+use super::shown;
 use crate::events::Times;
 use crate::ids::Seq;
 
@@ -57,15 +58,13 @@ fn show(arguments: Show) -> Result<(), Failure> {
     let mut times = Times::default();
     for record in past.store.log.read(&stream, Seq::FIRST).map_err(Failure::failed)? {
         let record = record.map_err(Failure::failed)?;
-        let lines = match arguments.json {
-            true => vec![show::json(&record).to_string()],
-            false => show::readable(&record, times.is_held(&record)),
+        let text = match arguments.json {
+            true => shown::json(&show::json(&record)) + "\n",
+            false => shown::lines(show::readable(&record, times.is_held(&record))),
         };
-        for line in lines {
-            writeln!(stdout, "{line}").map_err(|error| {
-                Failure::failed(format!("the log cannot be written to standard output: {error}"))
-            })?;
-        }
+        stdout.write_all(text.as_bytes()).map_err(|error| {
+            Failure::failed(format!("the log cannot be written to standard output: {error}"))
+        })?;
     }
     Ok(())
 }

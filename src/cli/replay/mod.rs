@@ -10,6 +10,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::past::{OfOne, Whose};
+use super::shown;
 use crate::ids::Seq;
 use crate::replay::{self, Minds};
 use crate::world::household::Household;
@@ -66,8 +67,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     } else if arguments.json {
         writeln!(stdout, "{}", show::json(&tenant, &session, head))
     } else {
-        let lines = show::readable(&tenant, &session, head);
-        lines.iter().try_for_each(|line| writeln!(stdout, "{line}"))
+        let text = shown::lines(show::readable(&tenant, &session, head));
+        stdout.write_all(text.as_bytes())
     };
     written.and_then(|()| stdout.flush()).map_err(|error| {
         Failure::failed(format!("the session cannot be written to standard output: {error}"))

@@ -1,5 +1,6 @@
 use serde_json::{Value, json};
 
+use crate::cli::shown;
 use crate::cli::terminal::count;
 use crate::ids::TenantId;
 use crate::session::{Phase, Session};
@@ -25,7 +26,7 @@ pub fn json<D: Domain>(tenant: &TenantId, session: &Session<D>, head: u64) -> St
         "mind_digest": session.state().mind,
         "state": state,
     });
-    format!("{object:#}")
+    shown::json_pretty(&object)
 }
 
 /// A session for a person.

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::sync::Arc;
 
 use crate::cli::failure::Failure;
+use crate::cli::shown;
 use crate::cli::terminal::count;
 use crate::cli::transcript::show_answer;
 use crate::events::{Ending, EpisodeStarted, Event, Record, SessionOpened};
@@ -12,10 +13,18 @@ use crate::ids::Seq;
 use crate::language::Document;
 use crate::learning::Recipe;
 use crate::limits::BATCH_EVENTS_MAX;
+use crate::plain;
 use crate::replay::command_of;
 use crate::session::{Command, OnClash, Phase, Rejection, Session};
 use crate::store::ReadError;
 use crate::world::{Domain, Stage};
+
+/// Writes one line, escaped: what was recorded adds no line of its own to a transcript.
+macro_rules! say {
+    ($out:expr, $($text:tt)*) => {
+        $out.write_all(shown::lines([format!($($text)*)]).as_bytes())
+    };
+}
 
 /// Writes the records up to the one at which `rebuilt` stands.
 ///
@@ -30,7 +39,7 @@ pub fn write<D: Domain>(
     let mut history = History { session: Session::new(domain.clone()), task_was_named: false };
     let mut batch: Vec<Record> = Vec::new();
     let last = rebuilt.head().seq;
-    let head = digests(rebuilt).iter().try_for_each(|line| writeln!(out, "{line}"));
+    let head = digests(rebuilt).iter().try_for_each(|line| say!(out, "{line}"));
     if head.is_err() {
         return Ok(head);
     }
@@ -50,7 +59,7 @@ pub fn write<D: Domain>(
     written = written.and_then(|()| history.tell(out, &batch));
     history.apply(&mut batch)?;
     Ok(written.and_then(|()| match rebuilt.phase() {
-        Phase::Learning => writeln!(out, "# Here it was still learning."),
+        Phase::Learning => say!(out, "# Here it was still learning."),
         _ => Ok(()),
     }))
 }
@@ -83,8 +92,18 @@ impl<D: Domain> History<D> {
     fn tell(&mut self, out: &mut impl Write, batch: &[Record]) -> io::Result<()> {
         let Some(first) = batch.first() else { return Ok(()) };
         match command_of(batch) {
-            Some(Command::Say { utterance }) => writeln!(out, "> {utterance}")?,
-            Some(Command::Done) => writeln!(out, "done")?,
+            Some(Command::Say { utterance }) => {
+                let seq = first.seq;
+                if plain::check(&utterance).is_err() {
+                    let said = plain::escape(&utterance);
+                    say!(
+                        out,
+                        "# Said at record {seq}, with � for what is no plain character: {said}"
+                    )?;
+                }
+                say!(out, "> {}", plain::replace(&utterance))?;
+            }
+            Some(Command::Done) => say!(out, "done")?,
             Some(Command::Teach { explains, actions, on_clash }) => {
                 return self.teach(out, batch, explains, &actions, on_clash);
             }
@@ -98,22 +117,23 @@ impl<D: Domain> History<D> {
                 Event::Interpreted(event) => {
                     let answer = &event.answer;
                     let text = show_answer(&answer.outcome, &answer.evidence, event.actions_before);
-                    writeln!(out, "{text}")?;
+                    say!(out, "{text}")?;
                 }
                 Event::EpisodeEnded(event) if event.ending == Ending::Achieved => {
                     let (said, done) =
                         (count(event.utterances, "utterance"), count(event.actions, "action"));
-                    writeln!(out, "achieved ({said}, {done})")?;
+                    say!(out, "achieved ({said}, {done})")?;
                 }
                 Event::RetrainCompleted(event) => {
                     let examples = event.report.exemplars;
-                    writeln!(out, "learn {examples} examples (mind {})", event.mind.short())?;
+                    say!(out, "learn {examples} examples (mind {})", event.mind.short())?;
                 }
                 Event::RetrainFailed(event) => {
-                    writeln!(out, "learn\nx learning_failed ({})", event.reason)?;
+                    say!(out, "learn")?;
+                    say!(out, "x learning_failed ({})", event.reason)?;
                 }
                 Event::SessionClosed(event) => {
-                    writeln!(out, "# Closed at record {}: {}", first.seq, event.reason)?;
+                    say!(out, "# Closed at record {}: {}", first.seq, event.reason)?;
                 }
                 _ => {}
             }
@@ -133,45 +153,42 @@ impl<D: Domain> History<D> {
         let said: Vec<_> = said.filter(|said| !said.settled).collect();
         let Some(this) = said.iter().find(|said| said.seq == explains) else { return Ok(()) };
         let later = said.iter().any(|other| {
-            other.seq > explains && other.utterance.as_str() == this.utterance.as_str()
+            let (other_words, words) = (other.utterance.as_str(), this.utterance.as_str());
+            other.seq > explains && plain::replace(other_words) == plain::replace(words)
         });
         if later {
-            writeln!(
-                out,
-                "# This was about an earlier one of the same words, at record {explains}."
-            )?;
+            say!(out, "# This was about an earlier one of the same words, at record {explains}.")?;
         }
-        let quoted = quoted(this.utterance.as_str());
+        let quoted = quoted(&plain::replace(this.utterance.as_str()));
         let (Some(first), Some(last)) = (actions.first(), actions.last()) else {
-            return writeln!(out, "teach {quoted} := nothing");
+            return say!(out, "teach {quoted} := nothing");
         };
         // A person who was not asked about a clash need not have said `keep`.
         let asked = Command::Teach { explains, actions: actions.to_vec(), on_clash: OnClash::Ask };
         let batch = &batch[0];
-        let clash = match self.session.propose(&asked, batch.request, batch.at) {
+        let clash = match self.session.propose_recorded(&asked, batch.request, batch.at) {
             Err(Rejection::Clash { .. }) if on_clash == OnClash::Replace => " replace",
             Err(Rejection::Clash { .. }) => " keep",
             _ => "",
         };
-        writeln!(out, "teach {quoted} := actions {first}..{last}{clash}")
+        say!(out, "teach {quoted} := actions {first}..{last}{clash}")
     }
 
     fn forget(&self, out: &mut impl Write, lesson: Seq) -> io::Result<()> {
         let live = &self.session.state().lessons;
         let Some(this) = live.iter().find(|live| live.seq == lesson) else { return Ok(()) };
-        let words = this.lesson.utterance.as_str();
-        if live.iter().any(|other| other.seq > lesson && other.lesson.utterance.as_str() == words) {
-            writeln!(
-                out,
-                "# This was about an earlier lesson of the same words, at record {lesson}."
-            )?;
+        let words = plain::replace(this.lesson.utterance.as_str());
+        if live.iter().any(|other| {
+            other.seq > lesson && plain::replace(other.lesson.utterance.as_str()) == words
+        }) {
+            say!(out, "# This was about an earlier lesson of the same words, at record {lesson}.")?;
         }
-        writeln!(out, "forget {}", quoted(words))
+        say!(out, "forget {}", quoted(&words))
     }
 
     /// The settings that give the episode's stage again, and the episode.
     fn stage(&mut self, out: &mut impl Write, event: &EpisodeStarted) -> io::Result<()> {
-        writeln!(out)?;
+        say!(out, "")?;
         let words = event.task.as_json().as_str().unwrap_or_default();
         let drawn = |stage: &Stage| match self.session.domain().stage(stage) {
             Ok((scene, task)) => {
@@ -183,26 +200,26 @@ impl<D: Domain> History<D> {
         match event.seed {
             Some(seed) if drawn(&Stage::Seed { seed }) => {
                 if self.task_was_named {
-                    writeln!(out, "task drawn")?;
+                    say!(out, "task drawn")?;
                 }
                 self.task_was_named = false;
-                writeln!(out, "seed {seed}")?;
+                say!(out, "seed {seed}")?;
             }
             seed => {
                 let again =
                     |seed: &u64| drawn(&Stage::Task { task: words.to_owned(), seed: *seed });
                 if !seed.as_ref().is_some_and(again) {
-                    writeln!(out, "# The scene was given as a file; to play this, name one here.")?;
+                    say!(out, "# The scene was given as a file; to play this, name one here.")?;
                 }
-                writeln!(out, "task {words}")?;
+                say!(out, "task {words}")?;
                 self.task_was_named = true;
                 if let Some(seed) = seed {
-                    writeln!(out, "seed {seed}")?;
+                    say!(out, "seed {seed}")?;
                 }
             }
         }
         let fewest = event.fewest.map(|n| format!(" (fewest actions: {n})"));
-        writeln!(out, "episode {}{}", event.goal, fewest.unwrap_or_default())
+        say!(out, "episode {}{}", event.goal, fewest.unwrap_or_default())
     }
 }
 
@@ -210,13 +227,13 @@ fn header(out: &mut impl Write, event: &SessionOpened) -> io::Result<()> {
     let name = event.user.as_str();
     // A bracket would end the name, as it ends every setting.
     match name.starts_with('(') || name.contains(" (") {
-        true => writeln!(out, "# user {name}")?,
-        false => writeln!(out, "user {name}")?,
+        true => say!(out, "# user {name}")?,
+        false => say!(out, "user {name}")?,
     }
     let ships = Recipe::builtin(&event.recipe).and_then(|text| Recipe::parse(text).ok());
     match ships.is_some_and(|recipe| recipe.digest() == event.recipe_digest) {
-        true => writeln!(out, "recipe {}", event.recipe),
-        false => writeln!(
+        true => say!(out, "recipe {}", event.recipe),
+        false => say!(
             out,
             "# The recipe {:?} does not ship; its text is in record 1. Save it and name it here.",
             event.recipe

@@ -7,9 +7,10 @@ use clap::Args;
 
 use crate::cli::bar::Bar;
 use crate::cli::failure::Failure;
-use crate::cli::{embedded, past, recipe};
+use crate::cli::{embedded, past, recipe, shown};
 use crate::ids::TenantId;
 use crate::learning::Recipe;
+use crate::plain;
 use crate::replay;
 use crate::study::rerun::{self, Report, Variant, With};
 use crate::world::household::Household;
@@ -82,11 +83,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         })?;
     }
     let text = match arguments.json {
-        true => {
-            let text = serde_json::to_string_pretty(&found.report);
-            text.expect("a report has text keys and finite numbers") + "\n"
-        }
-        false => found.report.to_string(),
+        true => shown::json_pretty(&found.report) + "\n",
+        false => plain::escape_lines(&found.report.to_string()).into_owned(),
     };
     let mut stdout = std::io::stdout().lock();
     stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {

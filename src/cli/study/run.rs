@@ -13,6 +13,7 @@ use super::super::embedded;
 use super::super::eval::tell_bad_lines;
 use super::super::failure::Failure;
 use super::super::recipe;
+use super::super::shown;
 use super::report;
 use crate::ids::Digest;
 use crate::learning::Recipe;
@@ -356,5 +357,5 @@ fn json_report(
         "utterances": tables.utterances.len(), "bad_lines": bad_lines,
         "summary": summary, "answered": answered,
     });
-    serde_json::to_string_pretty(&report).expect("reports have text keys and finite numbers") + "\n"
+    shown::json_pretty(&report) + "\n"
 }

@@ -1,6 +1,7 @@
 use std::io::{self, Write};
 
 use super::print;
+use crate::plain;
 
 /// How much the reader wants to see.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +38,7 @@ impl<'a> Screen<'a> {
     /// A report that was asked for, line by line in any style.
     pub fn report(&mut self, lines: &[String]) -> io::Result<()> {
         for line in lines {
-            writeln!(self.out, "{line}")?;
+            writeln!(self.out, "{}", plain::escape(line))?;
         }
         self.out.flush()
     }

@@ -1,5 +1,6 @@
 use super::line::{Act, Answer, Kind, Line, Setting, Transcript};
 use crate::language::Program;
+use crate::plain;
 use crate::session::OnClash;
 
 /// Why a text is no transcript: where, and what was expected there.
@@ -23,6 +24,12 @@ impl Transcript {
         let mut lines = Vec::new();
         for (index, text) in text.lines().enumerate() {
             let number = index + 1;
+            // A transcript is read by people, too; what is refused is played by nobody.
+            plain::check(&text.replace('\t', " ")).map_err(|hidden| SyntaxError {
+                line: number,
+                column: hidden.place,
+                reason: format!("U+{:04X} is no plain character", u32::from(hidden.found)),
+            })?;
             let mut cursor = Cursor { line: number, text, rest: text };
             let kind = cursor.line()?;
             lines.push(Line { number, text: text.to_owned(), kind });

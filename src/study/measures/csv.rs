@@ -1,9 +1,8 @@
 //! Rows as comma-separated values (RFC 4180, lines end with LF, fixed decimal places).
 
-use std::fmt::Write;
-
 use super::rows::{EpisodeRow, UtteranceRow};
 use super::summary::{AnsweredRow, SummaryRow};
+use crate::study::cells;
 
 pub fn utterances_csv(rows: &[UtteranceRow]) -> String {
     let mut table = Table::new(
@@ -103,12 +102,7 @@ impl Table {
             if index > 0 {
                 self.0.push(',');
             }
-            match field.contains([',', '"', '\n', '\r']) {
-                true => {
-                    let _ = write!(self.0, "\"{}\"", field.replace('"', "\"\""));
-                }
-                false => self.0.push_str(field),
-            }
+            self.0.push_str(&cells::written(field));
         }
         self.0.push('\n');
     }
@@ -122,6 +116,7 @@ mod tests {
     fn what_would_break_a_line_is_quoted() {
         let mut table = Table::new("a,b");
         table.line(&["put it, then \"go\"", ""]);
-        assert_eq!(table.0, "a,b\n\"put it, then \"\"go\"\"\",\n");
+        table.line(&["=1+1", "-1.5000"]);
+        assert_eq!(table.0, "a,b\n\"put it, then \"\"go\"\"\",\n'=1+1,-1.5000\n");
     }
 }

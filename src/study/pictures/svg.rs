@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::canvas::FONT;
 use super::style::{CURVE_WIDTH, LOOKS, hex};
+use crate::plain;
 
 pub const REGULAR: &[u8] = include_bytes!("../../../data/fonts/Roboto-Regular.ttf");
 pub const BOLD: &[u8] = include_bytes!("../../../data/fonts/Roboto-Bold.ttf");
@@ -89,6 +90,7 @@ pub fn font_faces() -> String {
 
 /// Text between tags or in quotes.
 pub fn escaped(text: &str) -> String {
+    let text = plain::escape_lines(text);
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -4,6 +4,8 @@ use std::collections::VecDeque;
 use std::fs;
 use std::path::Path;
 
+use crate::study::cells;
+
 /// The four tables of a study's directory; `docs/study.md` describes their columns.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tables {
@@ -123,7 +125,7 @@ impl Fields {
     }
 
     fn text(&mut self) -> String {
-        self.next().1
+        cells::read(self.next().1)
     }
 
     fn number(&mut self) -> Result<u32, String> {
@@ -408,6 +410,9 @@ mod tests {
             let found = summary(&text).unwrap_err();
             assert!(found.contains(expected), "{found}");
         }
+        let answered = "condition,answered_by,parses,share\n'=1+1,'tis,3,1.0000\n";
+        let row = &rows::<AnsweredRow>("answered.csv", answered).unwrap()[0];
+        assert_eq!((&*row.condition, &*row.answered_by), ("=1+1", "'tis"));
         let said = "condition,task_type,user,episode,turn,utterance,outcome,answered_by,guessed,\
                     meant,right,primitives,taught\np,clean,u1,1,1,\"go, now\",heard,,0,,,0,0\n";
         assert_eq!(

@@ -6,6 +6,7 @@ use super::configuration::Variant;
 use super::report::Change;
 use super::walk::Life;
 use crate::language::Outcome;
+use crate::study::cells;
 
 const HEADER: &str = "with,tenant,user,recorded_recipe,episode,turn,seq,utterance,recorded_outcome,\
                       recorded_program,other_outcome,other_program,change,before_the_loop_ended\n";
@@ -23,18 +24,18 @@ pub fn table(variants: &[Variant], lives: &[Life]) -> String {
                     let change = Change::of(&turn.recorded, other).name();
                     let closed = u8::from(episode.is_closed(number, place));
                     let fields = [
-                        quoted(&variant.name),
-                        quoted(life.tenant.as_str()),
-                        quoted(life.user.as_str()),
-                        quoted(&life.recipe),
+                        cells::written(&variant.name),
+                        cells::written(life.tenant.as_str()),
+                        cells::written(life.user.as_str()),
+                        cells::written(&life.recipe),
                         episode.number.to_string(),
                         (place + 1).to_string(),
                         turn.seq.to_string(),
-                        quoted(&turn.utterance),
+                        cells::written(&turn.utterance),
                         was.0.to_owned(),
-                        quoted(&was.1),
+                        cells::written(&was.1),
                         would.0.to_owned(),
-                        quoted(&would.1),
+                        cells::written(&would.1),
                         change.to_owned(),
                         closed.to_string(),
                     ];
@@ -52,12 +53,5 @@ fn cells(outcome: &Outcome) -> (&'static str, String) {
         Outcome::Understood { program, .. } => ("understood", program.to_string()),
         Outcome::Impossible { program, .. } => ("impossible", program.to_string()),
         Outcome::NotSure => ("not_sure", String::new()),
-    }
-}
-
-fn quoted(field: &str) -> String {
-    match field.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field.to_owned(),
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::{self, Display};
 
 use super::report::{EpisodeReport, Figures, LeftOut, Report, VariantReport};
 use crate::language::Outcome;
+use crate::plain;
 
 impl Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -38,7 +39,8 @@ impl Display for Report {
         for LeftOut { tenant, user, why, is_fault } in &self.left_out {
             let who = user.as_ref().map_or("somebody", |user| user.as_str());
             let mark = if *is_fault { "LEFT OUT, AND SOMETHING IS WRONG" } else { "left out" };
-            writeln!(f, "{mark}: {tenant}/{who}: {why}")?;
+            let left_out = format!("{mark}: {tenant}/{who}: {why}");
+            writeln!(f, "{}", plain::escape(&left_out))?;
         }
         match &self.variants[..] {
             [only] => {
@@ -52,8 +54,9 @@ impl Display for Report {
 
 fn people(f: &mut fmt::Formatter<'_>, variant: &VariantReport) -> fmt::Result {
     for person in variant.people.iter().filter(|person| !person.episodes.is_empty()) {
-        let recipe = &person.recorded_recipe;
-        writeln!(f, "\n{}/{} (recorded with {recipe})", person.tenant, person.user)?;
+        let (tenant, user, recipe) = (&person.tenant, &person.user, &person.recorded_recipe);
+        let head = format!("{tenant}/{user} (recorded with {recipe})");
+        writeln!(f, "\n{}", plain::escape(&head))?;
         for episode in &person.episodes {
             of_episode(f, episode)?;
         }
@@ -63,7 +66,7 @@ fn people(f: &mut fmt::Formatter<'_>, variant: &VariantReport) -> fmt::Result {
 
 fn of_episode(f: &mut fmt::Formatter<'_>, episode: &EpisodeReport) -> fmt::Result {
     let EpisodeReport { episode: number, goal, turns, loop_ends_at_turn, differences } = episode;
-    let goal = goal.trim_end_matches('.');
+    let goal = plain::escape(goal.trim_end_matches('.'));
     let ends = match loop_ends_at_turn {
         Some(turn) => format!("the open loop ends at turn {turn}"),
         None => "no action differs".to_owned(),
@@ -77,8 +80,8 @@ fn of_episode(f: &mut fmt::Formatter<'_>, episode: &EpisodeReport) -> fmt::Resul
     for difference in differences {
         let mark = if difference.before_the_loop_ended { "" } else { " (after the end)" };
         writeln!(f, "    turn {}{mark}: {:?}", difference.turn, difference.utterance)?;
-        writeln!(f, "      recorded  {}", said(&difference.recorded))?;
-        writeln!(f, "      other     {}", said(&difference.other))?;
+        writeln!(f, "      recorded  {}", plain::escape(&said(&difference.recorded)))?;
+        writeln!(f, "      other     {}", plain::escape(&said(&difference.other)))?;
     }
     Ok(())
 }

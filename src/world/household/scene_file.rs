@@ -64,8 +64,9 @@ pub(super) fn read(text: &str) -> Result<Scene, StageError> {
         let reason = format!("it has {found} bytes; at most {SCENE_FILE_BYTES_MAX} are read");
         return Err(error(0, reason));
     }
-    let file: SceneFile = toml::from_str(text)
-        .map_err(|e| error(e.span().map_or(0, |span| span.start), e.message().trim().to_owned()))?;
+    let file: SceneFile = toml::from_str(text).map_err(|e| {
+        error(e.span().map_or(0, |span| span.start), e.message().trim().replace('\n', "; "))
+    })?;
     let at = |place: &Spanned<String>, reason: String| error(place.span().start, reason);
     let room = Room::read(file.room.get_ref()).ok_or_else(|| {
         let known = Room::ALL.map(Room::key).join(", ");
