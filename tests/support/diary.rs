@@ -23,8 +23,19 @@ pub struct Diary<D: Domain> {
 impl<D: Domain> Diary<D> {
     /// Opens the session of a new person.
     pub fn new(domain: &Arc<D>, store: &Store, user: &str, recipe_text: &str) -> Diary<D> {
+        Diary::new_in(domain, store, &TenantId::local(), user, recipe_text)
+    }
+
+    /// Opens the session of a new person of a lab that exists.
+    pub fn new_in(
+        domain: &Arc<D>,
+        store: &Store,
+        tenant: &TenantId,
+        user: &str,
+        recipe_text: &str,
+    ) -> Diary<D> {
         let user = UserId::new(user).unwrap();
-        let stream = store.keys.stream_id(&TenantId::local(), &user).unwrap();
+        let stream = store.keys.stream_id(tenant, &user).unwrap();
         let recipe = Recipe::parse(recipe_text).unwrap();
         let mind = Arc::new(train(&**domain, &recipe, &[]).unwrap());
         let session = Session::new(domain.clone());
