@@ -283,7 +283,7 @@ fn bytes_in_the_log_are_counted_over_a_restart_and_can_be_allowed_again() {
     let data = Data::Directory(dir.path().to_owned());
     let (full, other) = (lab("full"), lab("other"));
     let limited = |bytes| Quotas { sealed_bytes: Some(bytes), ..Quotas::default() };
-    let first = service(data.clone(), &[(&full, limited(20_000)), (&other, Quotas::default())]);
+    let first = service(data.clone(), &[(&full, limited(40_000)), (&other, Quotas::default())]);
     let [full_key, other_key] = [&full, &other].map(|tenant| admit(&first, tenant));
     let commands = fill(&connect(&first, &full_key, 0, LONG));
     assert!(commands > 10, "{commands} commands");
@@ -376,7 +376,7 @@ fn a_full_lab_closes_erases_and_takes_keys_back_and_writes_nothing_else() {
     let dir = tempfile::tempdir().unwrap();
     let data = Data::Directory(dir.path().to_owned());
     let full = lab("full");
-    let quotas = Quotas { sealed_bytes: Some(20_000), ..Quotas::default() };
+    let quotas = Quotas { sealed_bytes: Some(40_000), ..Quotas::default() };
     let service = service(data, &[(&full, quotas)]);
     let gateway = admit(&service, &full);
     let operator = CurveKey::new().unwrap();
@@ -386,6 +386,9 @@ fn a_full_lab_closes_erases_and_takes_keys_back_and_writes_nothing_else() {
     let [ada, bob] = [0, 1].map(|number| connect(&service, &gateway, number, LONG));
     bob.start(stage()).unwrap();
     fill(&ada);
+    // Recorded behind the segments that the end of her last episode asked for.
+    let noted = Quotas { sealed_bytes: Some(39_999), ..Quotas::default() };
+    obey(service.registrar(), &full, Order::SetQuotas(noted));
     let keys = || std::fs::read_dir(dir.path().join("keys/users/full")).unwrap().count();
     let operator = connect(&service, &operator, 0, LONG);
     let before = (keys(), operator.heads().unwrap());

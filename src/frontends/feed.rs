@@ -321,8 +321,14 @@ impl Press {
             inbox.drain();
             self.hear();
             let stops = stopping.load(Ordering::SeqCst);
+            let mut published = 0u32;
             while let Some(growth) = self.growths.next() {
                 self.publish(&growth);
+                published += 1;
+                // Sending takes in subscriptions, too: they are counted in between.
+                if published.is_multiple_of(HEAR_EVERY) {
+                    self.hear();
+                }
             }
             // Whoever failed answers handshakes no more: nothing goes out to whoever came in then.
             if self.failure.reason().is_some() {
@@ -558,6 +564,8 @@ impl Stand {
 
 /// Bytes of a frame from a subscriber: a topic has 32, what is said at the handshake some 300.
 const SUBSCRIPTION_BYTES_MAX: i64 = 1_024;
+/// Growths published before subscriptions are read.
+const HEAR_EVERY: u32 = 64;
 /// Subscriptions read before messages are sent again.
 const BURST: usize = 1_024;
 
