@@ -193,7 +193,7 @@ fn two_labs_with_people_erased_retired_and_disabled_are_kept_whole() {
     let registry = book.registry(&fridge);
     assert!(registry.erased().contains_key(&bob.key));
     assert_eq!(registry.standing().disabled(), Some("over"));
-    assert!(registry.standing().keys()[&key(9)].valid_until.is_some());
+    assert!(registry.standing().keys()[&key(9)].retired.is_some());
     assert_eq!(registry.standing().quotas().awake_users, Some(50));
 }
 

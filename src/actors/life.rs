@@ -17,7 +17,7 @@ use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
 use crate::sabotage;
-use crate::session::{Command, Proposed, Rejection, Session, Turn};
+use crate::session::{Command, Proposed, Session, Turn};
 use crate::store::{EventLog, KeyError, Store};
 use crate::world::Domain;
 

@@ -24,7 +24,7 @@ use super::unsent::Unsent;
 use super::zap::{Gate, Seal};
 use super::{Context, CurveKey, Endpoint, GatewayError, lock, rights, wire};
 use crate::actors::{Failure, FeedView, Front, Growth, Growths, PlainView, Reader, SealedView};
-use crate::ids::{PublicKey, RequestId, Seq, TenantId};
+use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId};
 use crate::limits::{CUT_OFF_S, FEED_UNSENT_BYTES_MAX, FOREIGN_TOPICS_MAX, TOPICS_MAX};
 use crate::tenancy::Admissions;
 
