@@ -237,6 +237,7 @@ pub(super) fn wake<D: Domain>(
     let turn = match proposed {
         Ok(Proposed::Turn(turn)) => turn,
         Ok(Proposed::Repeat { .. }) => unreachable!("a fresh request id was not answered before"),
+        Ok(Proposed::Defect(divergence)) => return Err(unavailable(divergence.to_string())),
         Err(rejection) => return Err(unavailable(rejection.to_string())),
     };
     let durable = match life.log().append(stream, turn.after, turn.batch).wait() {

@@ -1,4 +1,5 @@
-//! The data directory that release 0.1 wrote.
+//! Data directories that earlier versions wrote.
+#![allow(dead_code)]
 
 use std::fs;
 use std::io::Read;
@@ -13,8 +14,14 @@ pub fn golden(name: &str) -> PathBuf {
 
 /// The released directory, unpacked.
 pub fn released() -> tempfile::TempDir {
+    unpacked(RELEASE)
+}
+
+/// A directory of those below `tests/golden`, unpacked.
+pub fn unpacked(name: &str) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let packed = fs::File::open(golden("data.tar.gz")).unwrap();
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
+    let packed = fs::File::open(golden.join(name).join("data.tar.gz")).unwrap();
     let mut tar = Vec::new();
     flate2::read::GzDecoder::new(packed).read_to_end(&mut tar).unwrap();
     unpack(&tar, dir.path());

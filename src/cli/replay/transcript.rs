@@ -12,8 +12,7 @@ use crate::ids::Seq;
 use crate::language::Document;
 use crate::learning::Recipe;
 use crate::limits::BATCH_EVENTS_MAX;
-use crate::replay::command_of;
-use crate::session::{Command, OnClash, Phase, Rejection, Session};
+use crate::session::{Command, OnClash, Phase, Rejection, Session, command_of};
 use crate::store::ReadError;
 use crate::world::{Domain, Stage};
 
