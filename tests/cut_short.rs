@@ -93,13 +93,13 @@ fn open_again(dir: &Path) -> Store {
 #[test]
 fn bringing_up_a_former_layout_survives_a_kill_at_any_moment() {
     let dice = dice();
-    let first = released();
+    let first = released("released-0.1", "data");
     let took = bring_up(first.path()).mul_f64(1.2);
     let expected = all_records(&store::open(first.path()).unwrap());
     assert!(expected.iter().map(Vec::len).sum::<usize>() > 20);
     let (mut before, mut after) = (0, 0);
     for _ in 0..KILLS {
-        let room = released();
+        let room = released("released-0.1", "data");
         let dir = room.path();
         let mut child = serve(dir);
         thread::sleep(part_of(took, &dice));

@@ -1,6 +1,8 @@
 //! `replay` and `audit` as people start them: what they print, how they end, and that the
 //! directory stays as it is.
 
+#[path = "support/released.rs"]
+mod released;
 mod support;
 
 use std::collections::BTreeMap;
@@ -11,10 +13,12 @@ use std::process::Command;
 use std::sync::Arc;
 
 use apprentice::events::Event;
-use apprentice::ids::Digest;
+use apprentice::ids::{Digest, TenantId, UserId};
 use apprentice::learning::Recipe;
+use apprentice::replay::{Minds, rebuild};
 use apprentice::store;
 use apprentice::world::household::Household;
+use released::released;
 use support::diary::Diary;
 use support::ran::run;
 
@@ -249,4 +253,58 @@ fn records_that_were_acknowledged_and_are_lost_are_told_with_the_directory_that_
     let ran = run(&["audit", "--data", &data], "");
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.err.contains(&data) && ran.err.contains("lost"), "{}", ran.err);
+}
+
+/// `golden/shut-out-0.2/data.tar.gz` was made by a 0.2 before its release: ada began an episode whose
+/// goal held already, with a scene of her own, and said "hello". That ended the episode, "hello" was
+/// not among the utterances to teach, and no fold took the record.
+#[test]
+fn whoever_an_ending_of_0_2_shut_out_comes_back() {
+    let folder = released("shut-out-0.2", "data");
+    let data = folder.path().display().to_string();
+    let before = contents(Path::new(&data));
+    let report = fine(&["audit", "--data", &data, "--repropose", "--retrain"]);
+    for part in ["1 utterance of them; 1 otherwise today", "no differences"] {
+        assert!(report.contains(part), "{part:?} is missing in\n{report}");
+    }
+    let replay = ["replay", "--data", &data, "--user", "ada"];
+    let json: serde_json::Value =
+        serde_json::from_str(&fine(&[&replay[..], &["--json"]].concat())).unwrap();
+    assert_eq!((&json["head"], &json["state"]["phase"]), (&4.into(), &"teaching".into()));
+    assert_eq!(json["state"]["episode"]["unexplained"][0]["utterance"], "hello");
+    fine(&[&replay[..], &["--transcript"]].concat());
+    assert_eq!(contents(Path::new(&data)), before, "nothing changed on disk");
+
+    // What was said counts as unexplained: nothing explains it, and life goes on.
+    let ran = run(&["--data", &data, "--user", "ada"], "none\n");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.out.contains("hello"), "{}", ran.out);
+    let task = ["--data", &data, "--user", "ada", "--seed", "3", "--task", "free kitchen"];
+    let ran = run(&task, "go to the fridge\ndone\n");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let log = fine(&["log", "show", "--data", &data, "--user", "ada"]);
+    for kind in ["DecompositionDeclined", "RetrainCompleted"] {
+        assert!(log.contains(kind), "{kind} is missing in\n{log}");
+    }
+    assert_eq!(log.matches("EpisodeEnded").count(), 2, "{log}");
+    fine(&["audit", "--data", &data, "--repropose", "--retrain"]);
+}
+
+#[test]
+fn an_ending_that_leaves_out_anything_else_is_still_a_difference() {
+    let domain = Arc::new(Household::new());
+    let recipe = Recipe::builtin("tiny").unwrap();
+    let mut diary = Diary::new(&domain, &store::open_memory(), "ada", recipe);
+    diary.start("free kitchen");
+    diary.say("flibbertigibbet");
+    diary.done();
+    let left_out = diary.doctored(store::open_memory(), |_, event| {
+        if let Event::EpisodeEnded(ended) = event {
+            ended.to_teach.clear();
+        }
+    });
+    // Saying done brings no goal about: no version left out what was said just before.
+    let stream = left_out.keys.stream_id(&TenantId::local(), &UserId::new("ada").unwrap()).unwrap();
+    let error = rebuild(&domain, &left_out, &stream, &Minds::default()).err().unwrap();
+    assert!(error.to_string().contains("utterances to teach"), "{error}");
 }

@@ -4,6 +4,8 @@
 #[allow(dead_code)]
 mod toy;
 
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -16,7 +18,7 @@ use apprentice::limits::{FRAME_BYTES_MAX, MAILBOX_MAX};
 use apprentice::service::{Data, Service, StartError};
 use apprentice::session::{Command, OnClash, Phase, RejectionCode, Reply, Told};
 use apprentice::world::Stage;
-use toy::config;
+use toy::{Bells, Fickle, config};
 
 const LONG: Duration = Duration::from_secs(60);
 
@@ -443,6 +445,36 @@ fn a_defect_costs_one_answer_and_nothing_that_was_recorded() {
     );
     assert_eq!(ada.status().unwrap().seq, seq, "rebuilt from the log, nothing recorded");
     ada.say("mute the brass bell").unwrap();
+    assert_eq!(service.failed(), None);
+    service.stop().unwrap();
+}
+
+#[test]
+fn what_cannot_be_applied_is_not_appended_and_its_person_goes_on() {
+    let fickle = Arc::new(Fickle::default());
+    let mut config = config(Data::Memory);
+    config.domain = Arc::new(Bells::fickle(fickle.clone()));
+    config.listen = vec!["tcp://127.0.0.1:0".to_owned()];
+    let service = Service::start(config).unwrap();
+    let ada = connect(&service, "ada");
+    ada.start(task("Brass Glass")).unwrap();
+    let seq = ada.status().unwrap().seq;
+    fickle.is_on.store(true, Ordering::SeqCst);
+    for command in [
+        Command::Say { utterance: "ring the brass bell".to_owned() },
+        Command::Say { utterance: "flibbertigibbet".to_owned() },
+    ] {
+        let failed = ada.command(command).unwrap_err();
+        assert!(
+            matches!(&failed, ClientError::Failed { code: ErrorCode::Internal, message }
+                if message.contains("nothing was recorded") && message.contains("scene digest")),
+            "{failed:?}"
+        );
+        assert_eq!(ada.status().unwrap().seq, seq, "nothing was appended");
+    }
+    fickle.is_on.store(false, Ordering::SeqCst);
+    let rung = ada.say("ring the brass bell").unwrap();
+    assert_eq!(rung.first.get(), seq + 1);
     assert_eq!(service.failed(), None);
     service.stop().unwrap();
 }

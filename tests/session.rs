@@ -74,6 +74,7 @@ impl Person {
         let turn = match self.session.propose(command, request, at)? {
             Proposed::Turn(turn) => turn,
             Proposed::Repeat { .. } => panic!("a fresh request id was answered before"),
+            Proposed::Defect(divergence) => panic!("{command:?}: {divergence}"),
         };
         let durable = self.store.log.append(&self.stream, turn.after, turn.batch).wait().unwrap();
         Ok(self.session.settle(&durable).unwrap())

@@ -254,11 +254,12 @@ pub(super) fn open<D: Domain>(
         mind: life.base.digest(),
     };
     let proposed = session.propose(&command, fresh_request(), session.next_at(life.now()));
-    match proposed.map_err(|rejection| {
-        Box::new(Response::error(ErrorCode::Unavailable, rejection.to_string()))
-    })? {
-        Proposed::Turn(turn) => Ok(turn),
-        Proposed::Repeat { .. } => unreachable!("a fresh request id was not answered before"),
+    let unavailable = |reason: String| Box::new(Response::error(ErrorCode::Unavailable, reason));
+    match proposed {
+        Ok(Proposed::Turn(turn)) => Ok(turn),
+        Ok(Proposed::Repeat { .. }) => unreachable!("a fresh request id was not answered before"),
+        Ok(Proposed::Defect(divergence)) => Err(unavailable(divergence.to_string())),
+        Err(rejection) => Err(unavailable(rejection.to_string())),
     }
 }
 

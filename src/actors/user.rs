@@ -13,13 +13,13 @@ use super::response::{Ask, ErrorCode, Rejected, Response, Waited};
 use super::submit::{AnswerTo, Submit};
 use super::trainer::{Train, Trained};
 use crate::events::{Durable, Report};
-use crate::ids::RequestId;
+use crate::ids::{RequestId, Seq};
 use crate::learning;
 use crate::limits::{MAILBOX_MAX, WAIT_S_MAX, WAITERS_MAX};
 use crate::sabotage;
 use crate::session::{
-    Command, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Status, Told,
-    Turn, reply_of,
+    Command, Divergence, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Status,
+    Told, Turn,
 };
 use crate::store::AppendError;
 use crate::world::Domain;
@@ -167,12 +167,12 @@ impl<D: Domain> UserActor<D> {
         let turn = match proposed {
             Ok(Ok(Proposed::Turn(turn))) => turn,
             Ok(Ok(Proposed::Repeat { first, last })) => {
-                let records = self.life.records(&self.waking.stream, first, last);
-                let response = match records {
-                    Ok(records) => Response::Reply(reply_of(&records)),
-                    Err(reason) => Response::error(ErrorCode::Unavailable, reason),
-                };
+                let response = self.repeat(session, &command, first, last);
                 respond(answer, response);
+                return Self::done();
+            }
+            Ok(Ok(Proposed::Defect(divergence))) => {
+                respond(answer, self.cannot_be_applied(session, divergence));
                 return Self::done();
             }
             Ok(Err(rejection)) => {
@@ -231,6 +231,40 @@ impl<D: Domain> UserActor<D> {
             tracing::info!(stream = %actor.waking.stream, "somebody new");
             actor.perform(first, request, answer)
         }))
+    }
+
+    /// The answer to a request id that was answered before, by the records `first` to `last`.
+    fn repeat(&self, session: &Session<D>, command: &Command, first: Seq, last: Seq) -> Response {
+        let records = match self.life.records(&self.waking.stream, first, last) {
+            Ok(records) => records,
+            Err(reason) => return Response::error(ErrorCode::Unavailable, reason),
+        };
+        // A stage may be set once more for it, in the same code that may have panicked before.
+        match catch_unwind(AssertUnwindSafe(|| session.repeat(command, &records))) {
+            Ok(Ok(reply)) => Response::Reply(reply),
+            Ok(Err(rejection)) => rejection.into(),
+            Err(panic) => defect("comparing a repeated request", &*panic),
+        }
+    }
+
+    /// The answer to a command whose events the fold refuses. Nothing was appended, and the session
+    /// did not change: it goes on.
+    fn cannot_be_applied(&self, session: &Session<D>, divergence: Divergence) -> Response {
+        // Both values may hold what a person said; the digest finds the state that shows it again.
+        let Divergence { seq, field, .. } = &divergence;
+        let (stream, state) = (&self.waking.stream, session.state_digest());
+        tracing::error!(
+            %stream, %seq, field, %state,
+            "a defect: what was decided cannot be applied; nothing was recorded"
+        );
+        tracing::debug!(%stream, %divergence, "what the defect was");
+        Response::error(
+            ErrorCode::Internal,
+            format!(
+                "a defect of apprentice while deciding; nothing was recorded, please report it: \
+                 {divergence}"
+            ),
+        )
     }
 
     fn settle(

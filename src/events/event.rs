@@ -108,6 +108,16 @@ pub struct EpisodeEnded {
     pub to_teach: Vec<Seq>,
 }
 
+impl EpisodeEnded {
+    /// Whether `to_teach` is what versions up to 0.2 recorded of `unexplained`, as the record `seq`:
+    /// where the goal held although the last utterance had not brought it about, they left that
+    /// utterance out. No version since does, and such a record means what today's would.
+    pub fn leaves_out_its_own(&self, seq: Seq, unexplained: &[Seq]) -> bool {
+        let Some((last, before)) = unexplained.split_last() else { return false };
+        self.ending == Ending::Achieved && last.next() == seq && self.to_teach == before
+    }
+}
+
 /// A person said which run of actions an utterance stands for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DecompositionTaught {

@@ -7,12 +7,13 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::audit::{Counts, Progress, Scrutiny, StreamReport};
 use super::evidence::{SegmentError, check_segment, newest_checkpoint};
 use super::origins::mind_origin;
-use super::{Difference, erasures, repropose};
+use super::repropose::{self, Verdict};
+use super::{Difference, erasures};
 use crate::events::{Event, Record, Report, RetrainCompleted, SegmentClosed, TenantEvent, Times};
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
-use crate::session::{Outstanding, Session};
+use crate::session::{Outstanding, Session, command_of};
 use crate::store::{Found, ReadError, Store};
 use crate::tenancy::Registry;
 use crate::world::Domain;
@@ -282,7 +283,7 @@ impl<'a, D: Domain> Auditor<'a, D> {
     }
 
     fn repropose(&mut self, batch: &[Record]) {
-        let Some(command) = repropose::command_of(batch) else { return };
+        let Some(command) = command_of(batch) else { return };
         if !self.session.is_open() {
             return;
         }
@@ -292,9 +293,13 @@ impl<'a, D: Domain> Auditor<'a, D> {
         }
         self.counts.reproposed += 1;
         self.counts.reproposed_utterances += u64::from(says);
-        if let Some(difference) = repropose::compare(&self.session, &command, batch) {
-            self.counts.proposals_differ += 1;
-            self.note(difference);
+        match repropose::compare(&self.session, &command, batch) {
+            Verdict::Same => {}
+            Verdict::OfOld => self.counts.proposals_differ += 1,
+            Verdict::Differs(difference) => {
+                self.counts.proposals_differ += 1;
+                self.note(difference);
+            }
         }
     }
 

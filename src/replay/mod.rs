@@ -21,4 +21,3 @@ pub use evidence::{
 pub use minds::{Minds, Work};
 pub use origins::{keep_mind, mind_origin, state_origin};
 pub use rebuild::{RebuildError, keep_snapshot, mind_of, rebuild, rebuild_at};
-pub use repropose::command_of;

@@ -1,63 +1,29 @@
 //! Deciding a recorded command again, and holding what would be recorded against what was.
 
 use super::Difference;
-use crate::events::{Ending, Event, Record};
-use crate::session::{Command, OnClash, Proposed, Session};
+use crate::events::{EpisodeEnded, Event, Record};
+use crate::session::{Command, Proposed, Session};
 use crate::world::Domain;
 
-/// The command that these records came from, where the records tell: all but the stage of an
-/// episode (a scene file is not recorded as its text), opening, closing and the end of a training.
-pub fn command_of(batch: &[Record]) -> Option<Command> {
-    let first = &batch.first()?.event;
-    let teaches = batch.iter().find_map(|record| match &record.event {
-        Event::DecompositionTaught(taught) => Some(taught),
-        _ => None,
-    });
-    if let Some(taught) = teaches {
-        // Whether the person was asked about a clash is not recorded, and need not be: keeping both
-        // records the same when there is none.
-        let replaces = matches!(first, Event::LessonForgotten(_));
-        return Some(Command::Teach {
-            explains: taught.explains,
-            actions: run(taught.first, taught.last),
-            on_clash: if replaces { OnClash::Replace } else { OnClash::Keep },
-        });
-    }
-    match first {
-        Event::Interpreted(event) => {
-            Some(Command::Say { utterance: event.utterance.as_str().to_owned() })
-        }
-        Event::EpisodeEnded(event) if event.ending == Ending::Abandoned => Some(Command::Done),
-        Event::DecompositionDeclined(event) => Some(Command::Teach {
-            explains: event.explains,
-            actions: Vec::new(),
-            on_clash: OnClash::Ask,
-        }),
-        Event::LessonForgotten(event) => Some(Command::Forget { lesson: event.lesson }),
-        Event::RetrainScheduled(_) => Some(Command::FinishTeaching),
-        _ => None,
-    }
-}
-
-/// Both ends included; one that runs backwards keeps both, so that deciding says what is wrong.
-fn run(first: u32, last: u32) -> Vec<u32> {
-    let longest = crate::limits::EPISODE_ACTIONS_MAX as u32;
-    match first <= last && last - first < longest {
-        true => (first..=last).collect(),
-        false => vec![first, last],
-    }
+/// What deciding again came to.
+pub(super) enum Verdict {
+    Same,
+    /// Recorded otherwise by an old version, in a way that is known and means the same.
+    OfOld,
+    /// The first place at which the proposed events are not the recorded ones.
+    Differs(Difference),
 }
 
 /// Decides `command` in `session`, which stands just before `batch` and has its mind where the
 /// command needs one.
 ///
-/// - returns: the first place at which the proposed events are not the recorded ones.
+/// - panics: when `batch` is empty.
 pub(super) fn compare<D: Domain>(
     session: &Session<D>,
     command: &Command,
     batch: &[Record],
-) -> Option<Difference> {
-    let first = batch.first()?;
+) -> Verdict {
+    let first = batch.first().expect("a command led to at least one record");
     let kinds = || batch.iter().map(|record| format!("{:?}", record.event.kind()));
     let recorded = || kinds().collect::<Vec<_>>().join(", ");
     let events = match session.propose_recorded(command, first.request, first.at) {
@@ -65,16 +31,26 @@ pub(super) fn compare<D: Domain>(
         Ok(Proposed::Repeat { first: old, .. }) => {
             let field = "request";
             let recomputed = format!("a repetition of record {old}");
-            return Some(Difference::new(first.seq.get(), field, recorded(), recomputed));
+            let found = Difference::new(first.seq.get(), field, recorded(), recomputed);
+            return Verdict::Differs(found);
+        }
+        Ok(Proposed::Defect(divergence)) => {
+            return Verdict::Differs(Difference::of_fold(divergence));
         }
         Err(rejection) => {
             let recomputed = format!("a refusal: {rejection}");
-            return Some(Difference::new(first.seq.get(), "decision", recorded(), recomputed));
+            let found = Difference::new(first.seq.get(), "decision", recorded(), recomputed);
+            return Verdict::Differs(found);
         }
     };
+    let mut verdict = Verdict::Same;
     for (record, event) in batch.iter().zip(&events) {
-        if let found @ Some(_) = Difference::of_events(record.seq.get(), &record.event, event) {
-            return found;
+        let Some(found) = Difference::of_events(record.seq.get(), &record.event, event) else {
+            continue;
+        };
+        match is_of_old(record, event) {
+            true => verdict = Verdict::OfOld,
+            false => return Verdict::Differs(found),
         }
     }
     let one = |event: Option<&Event>| match event {
@@ -82,8 +58,20 @@ pub(super) fn compare<D: Domain>(
         None => "no further record".to_owned(),
     };
     let both = batch.len().min(events.len());
-    (batch.len() != events.len()).then(|| {
+    if batch.len() != events.len() {
         let (old, new) = (batch.get(both).map(|record| &record.event), events.get(both));
-        Difference::new(first.seq.get() + both as u64, "kind", one(old), one(new))
-    })
+        let seq = first.seq.get() + both as u64;
+        return Verdict::Differs(Difference::new(seq, "kind", one(old), one(new)));
+    }
+    verdict
+}
+
+/// Whether the two differ only in what is known of records of versions up to 0.2, and means the
+/// same; see [`EpisodeEnded::leaves_out_its_own`].
+fn is_of_old(record: &Record, today: &Event) -> bool {
+    let (Event::EpisodeEnded(old), Event::EpisodeEnded(new)) = (&record.event, today) else {
+        return false;
+    };
+    let whole = EpisodeEnded { to_teach: new.to_teach.clone(), ..old.clone() };
+    old.leaves_out_its_own(record.seq, &new.to_teach) && whole == *new
 }

@@ -36,11 +36,28 @@ pub fn apply<D: Domain>(
     let seq = record.seq;
     agree(seq, "sequence number", seq.get(), state.head.seq + 1)?;
     agree(seq, "predecessor", record.prev, state.head.digest)?;
-    let opens = matches!(record.event, Event::SessionOpened(_));
+    apply_event(domain, state, seq, &record.event)?;
+    state.head = Head { seq: seq.get(), digest: record.digest }.into();
+    state.last_at = record.at;
+    state.requests.note(record.request, seq);
+    Ok(())
+}
+
+/// Applies an event as the record `seq`, which nobody need have recorded yet: all of [`apply`] but
+/// the place in the chain, the time and the request.
+///
+/// - errors: [`Divergence`]; the state is then not to be used any more.
+pub(super) fn apply_event<D: Domain>(
+    domain: &D,
+    state: &mut State<D::Scene, D::Task>,
+    seq: Seq,
+    event: &Event,
+) -> Result<(), Divergence> {
+    let opens = matches!(event, Event::SessionOpened(_));
     if opens == state.opened.is_some() {
         return Err(outside(seq, "an open session"));
     }
-    match &record.event {
+    match event {
         Event::SessionOpened(event) => open(domain, state, seq, event)?,
         Event::EpisodeStarted(event) => start(domain, state, seq, event)?,
         Event::Interpreted(event) => interpret(domain, state, seq, event)?,
@@ -68,9 +85,6 @@ pub fn apply<D: Domain>(
         }
         Event::Tenant(_) => return Err(outside(seq, "a tenant's own stream")),
     }
-    state.head = Head { seq: seq.get(), digest: record.digest }.into();
-    state.last_at = record.at;
-    state.requests.note(record.request, seq);
     Ok(())
 }
 
@@ -82,14 +96,14 @@ fn open<D: Domain>(
 ) -> Result<(), Divergence> {
     agree(seq, "domain", event.domain.as_str(), domain.id())?;
     agree(seq, "domain version", event.domain_version, domain.version())?;
-    state.opened = Some(Opened {
+    state.opened = Some(Arc::new(Opened {
         user: event.user.clone(),
         domain: event.domain.clone(),
         domain_version: event.domain_version,
         recipe: event.recipe.clone(),
         recipe_text: event.recipe_text.clone(),
         recipe_digest: event.recipe_digest,
-    });
+    }));
     state.mind = Some(event.mind);
     Ok(())
 }
@@ -134,15 +148,17 @@ fn interpret<D: Domain>(
     agree(seq, "actions before", event.actions_before as usize, episode.actions.len())?;
     episode.utterances += 1;
     let guessed = event.answer.guessed();
-    let unexplained = |not_sure: bool| Unexplained {
-        seq,
-        utterance: event.utterance.clone(),
-        not_sure,
-        guessed,
-        actions_before: event.actions_before,
-        scene: episode.scene.clone(),
-        mentioned: episode.mentioned.clone(),
-        settled: false,
+    let unexplained = |not_sure: bool| {
+        Arc::new(Unexplained {
+            seq,
+            utterance: event.utterance.clone(),
+            not_sure,
+            guessed,
+            actions_before: event.actions_before,
+            scene: episode.scene.clone(),
+            mentioned: episode.mentioned.clone(),
+            settled: false,
+        })
     };
     match &event.answer.outcome {
         Outcome::Understood { program, bindings } => {
@@ -160,7 +176,7 @@ fn interpret<D: Domain>(
                     })?;
                 let recorded = bindings.get(index).cloned().unwrap_or_default();
                 agree(seq, "binding", recorded.join(", "), bound.join(", "))?;
-                episode.actions.push(Action { step: step.clone(), binding: bound });
+                episode.actions.push(Arc::new(Action { step: step.clone(), binding: bound }));
             }
             episode.scene = Arc::new(scene);
         }
@@ -180,12 +196,14 @@ fn end<S, T>(state: &mut State<S, T>, seq: Seq, event: &EpisodeEnded) -> Result<
     let unexplained: Vec<Seq> = episode.unexplained.iter().map(|said| said.seq).collect();
     agree(seq, "utterances", event.utterances, episode.utterances)?;
     agree(seq, "actions", event.actions as usize, episode.actions.len())?;
-    agree(seq, "utterances to teach", seqs(&event.to_teach), seqs(&unexplained))?;
-    state.phase = if event.to_teach.is_empty() { Phase::Idle } else { Phase::Teaching };
+    if !event.leaves_out_its_own(seq, &unexplained) {
+        agree(seq, "utterances to teach", seqs(&event.to_teach), seqs(&unexplained))?;
+    }
+    state.phase = if unexplained.is_empty() { Phase::Idle } else { Phase::Teaching };
     Ok(())
 }
 
-fn teach<S, T>(
+fn teach<S: Clone, T>(
     state: &mut State<S, T>,
     seq: Seq,
     event: &DecompositionTaught,
@@ -207,7 +225,7 @@ fn teach<S, T>(
         task: episode.task.clone(),
         mentioned,
     };
-    state.lessons.push(LiveLesson { seq, lesson });
+    state.lessons.push(Arc::new(LiveLesson { seq, lesson }));
     Ok(())
 }
 
@@ -240,14 +258,14 @@ fn complete<S, T>(
     Ok(())
 }
 
-fn unexplained<S, T>(
+fn unexplained<S: Clone, T>(
     state: &mut State<S, T>,
     seq: Seq,
     explains: Seq,
 ) -> Result<&mut Unexplained<S>, Divergence> {
     let episode = state.episode.as_mut().ok_or_else(|| outside(seq, "an episode"))?;
     let found = episode.unexplained.iter_mut().find(|said| said.seq == explains);
-    found.ok_or_else(|| Divergence {
+    found.map(Arc::make_mut).ok_or_else(|| Divergence {
         seq,
         field: "explained utterance",
         recorded: format!("record {explains}"),

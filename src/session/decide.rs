@@ -1,8 +1,9 @@
 //! Which events a command deserves. Pure: it reads the state and asks the mind, and promises
 //! nothing; the proposed events become true when the log has them.
 
+use super::apply::apply_event;
 use super::state::{Episode, State, Unexplained};
-use super::{Command, OnClash, Phase, Rejection, Session};
+use super::{Command, Divergence, OnClash, Phase, Rejection, Session};
 use crate::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
     Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed, RetrainScheduled,
@@ -17,40 +18,84 @@ use crate::learning::{self, Lesson, Recipe};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
 };
-use crate::world::{Domain, Stage};
+use crate::world::{Domain, Stage, StageError};
 
-/// - errors: a [`Rejection`]; nothing is then recorded.
+/// Why a command leads to no event.
+pub(super) enum Refusal {
+    Rejected(Rejection),
+    /// What was decided cannot be applied: decider and fold disagree, which is a defect of ours.
+    Defect(Divergence),
+}
+
+impl From<Rejection> for Refusal {
+    fn from(rejection: Rejection) -> Refusal {
+        Refusal::Rejected(rejection)
+    }
+}
+
+/// The events decided so far, and the state as it will be after them.
+///
+/// An event enters through [`Draft::add`] alone, and what one event says of those before it is
+/// read from the state that they led to. So nothing is proposed that the fold refuses: a record
+/// that no fold accepts would shut its person out for ever.
+struct Draft<'a, D: Domain> {
+    session: &'a Session<D>,
+    state: State<D::Scene, D::Task>,
+    events: Vec<Event>,
+}
+
+impl<D: Domain> Draft<'_, D> {
+    /// - errors: the event does not follow from those before it.
+    fn add(&mut self, event: Event) -> Result<(), Refusal> {
+        let seq = self.session.state.head.seq + self.events.len() as u64 + 1;
+        let seq = Seq::new(seq).expect("a head's successor is at least 1");
+        apply_event(&*self.session.domain, &mut self.state, seq, &event)
+            .map_err(Refusal::Defect)?;
+        self.events.push(event);
+        Ok(())
+    }
+}
+
+/// - returns: the events, which [`super::apply`] takes in the session's state.
+/// - errors: a [`Refusal`]; nothing is then recorded.
 pub(super) fn decide<D: Domain>(
     session: &Session<D>,
     command: &Command,
-) -> Result<Vec<Event>, Rejection> {
+) -> Result<Vec<Event>, Refusal> {
+    let mut draft = Draft { session, state: session.state.scratch(), events: Vec::new() };
     match (session.state.phase, command) {
-        (Phase::Closed, _) => Err(Rejection::Closed),
-        (_, Command::Open { user, recipe_text, mind }) => open(session, user, recipe_text, *mind),
-        (Phase::Idle, Command::StartEpisode { stage }) => start(session, stage),
-        (Phase::Interacting, Command::Say { utterance }) => say(session, utterance),
-        (Phase::Interacting, Command::Done) => {
-            Ok(vec![end(session, Ending::Abandoned, &Adds::default())])
+        (Phase::Closed, _) => return Err(Rejection::Closed.into()),
+        (_, Command::Open { user, recipe_text, mind }) => {
+            draft.add(open(session, user, recipe_text, *mind)?)?;
         }
+        (Phase::Idle, Command::StartEpisode { stage }) => draft.add(start(session, stage)?)?,
+        (Phase::Interacting, Command::Say { utterance }) => say(&mut draft, utterance)?,
+        (Phase::Interacting, Command::Done) => draft.add(end(&draft.state, Ending::Abandoned))?,
         (Phase::Teaching, Command::Teach { explains, actions, on_clash }) => {
-            teach(session, *explains, actions, *on_clash)
+            teach(&mut draft, *explains, actions, *on_clash)?;
         }
-        (Phase::Teaching, Command::FinishTeaching) => Ok(vec![retrain(session, None)]),
-        (Phase::Teaching, Command::Forget { lesson }) => Ok(vec![forget(session, *lesson)?]),
+        (Phase::Teaching, Command::FinishTeaching) => draft.add(retrain(&draft))?,
+        (Phase::Teaching, Command::Forget { lesson }) => draft.add(forget(session, *lesson)?)?,
         (Phase::Idle, Command::Forget { lesson }) => {
-            Ok(vec![forget(session, *lesson)?, retrain(session, Some(*lesson))])
+            draft.add(forget(session, *lesson)?)?;
+            draft.add(retrain(&draft))?;
         }
         // Else whoever mistypes a name would make a person of it, for good.
-        (_, Command::Close { .. }) if session.state.opened.is_none() => Err(Rejection::NobodyThere),
+        (_, Command::Close { .. }) if session.state.opened.is_none() => {
+            return Err(Rejection::NobodyThere.into());
+        }
         (_, Command::Close { reason }) => {
-            Ok(vec![Event::SessionClosed(SessionClosed { reason: reason.clone() })])
+            draft.add(Event::SessionClosed(SessionClosed { reason: reason.clone() }))?;
         }
         (_, Command::FinishRetrain { recipe, outcome }) => {
-            finish_retrain(session, *recipe, outcome)
+            draft.add(finish_retrain(session, *recipe, outcome)?)?;
         }
-        (Phase::Learning, _) => Err(Rejection::StillLearning),
-        (phase, command) => Err(Rejection::WrongPhase { command: command.name(), phase }),
+        (Phase::Learning, _) => return Err(Rejection::StillLearning.into()),
+        (phase, command) => {
+            return Err(Rejection::WrongPhase { command: command.name(), phase }.into());
+        }
     }
+    Ok(draft.events)
 }
 
 fn open<D: Domain>(
@@ -58,13 +103,13 @@ fn open<D: Domain>(
     user: &UserId,
     recipe_text: &str,
     mind: Digest,
-) -> Result<Vec<Event>, Rejection> {
+) -> Result<Event, Rejection> {
     if session.state.opened.is_some() {
         return Err(Rejection::AlreadyOpen);
     }
     let recipe = Recipe::parse(recipe_text)
         .map_err(|error| Rejection::Recipe { reason: error.to_string() })?;
-    Ok(vec![Event::SessionOpened(SessionOpened {
+    Ok(Event::SessionOpened(SessionOpened {
         user: user.clone(),
         domain: session.domain.id().to_owned(),
         domain_version: session.domain.version(),
@@ -72,22 +117,17 @@ fn open<D: Domain>(
         recipe_text: recipe_text.to_owned(),
         recipe_digest: recipe.digest(),
         mind,
-    })])
+    }))
 }
 
-fn start<D: Domain>(session: &Session<D>, stage: &Stage) -> Result<Vec<Event>, Rejection> {
-    let found = match stage {
-        Stage::Seed { .. } => 0,
-        Stage::Task { task, .. } => task.len(),
-        Stage::Scene { scene, task } => scene.len() + task.len(),
-    };
-    if found > SCENE_FILE_BYTES_MAX {
-        return Err(Rejection::SceneTooLarge { found });
-    }
+fn start<D: Domain>(session: &Session<D>, stage: &Stage) -> Result<Event, Rejection> {
     let domain = &*session.domain;
-    let (scene, task) = domain.stage(stage)?;
+    let (scene, task) = set(domain, stage)?;
+    if domain.achieved(&scene, &task) {
+        return Err(StageError::Achieved { goal: domain.goal(&task) }.into());
+    }
     let plan = domain.plan(&scene, &task);
-    Ok(vec![Event::EpisodeStarted(EpisodeStarted {
+    Ok(Event::EpisodeStarted(EpisodeStarted {
         scene: Document::of(&scene),
         scene_digest: domain.digest(&scene),
         task: Document::of(&task),
@@ -97,17 +137,31 @@ fn start<D: Domain>(session: &Session<D>, stage: &Stage) -> Result<Vec<Event>, R
             Stage::Scene { .. } => None,
         },
         fewest: plan.map(|program| program.steps.len() as u32),
-    })])
+    }))
 }
 
-fn say<D: Domain>(session: &Session<D>, text: &str) -> Result<Vec<Event>, Rejection> {
+/// The scene and the task that a stage asks for, unless it is longer than is read.
+pub(super) fn set<D: Domain>(domain: &D, stage: &Stage) -> Result<(D::Scene, D::Task), Rejection> {
+    let found = match stage {
+        Stage::Seed { .. } => 0,
+        Stage::Task { task, .. } => task.len(),
+        Stage::Scene { scene, task } => scene.len() + task.len(),
+    };
+    match found > SCENE_FILE_BYTES_MAX {
+        true => Err(Rejection::SceneTooLarge { found }),
+        false => Ok(domain.stage(stage)?),
+    }
+}
+
+fn say<D: Domain>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
     // Of what is said now, `Session::propose` has checked more.
-    let utterance = Utterance::recorded(text)?;
+    let utterance = Utterance::recorded(text).map_err(Rejection::from)?;
+    let session = draft.session;
     let (domain, episode) = (&*session.domain, episode(&session.state));
     if episode.utterances as usize >= EPISODE_UTTERANCES_MAX
         || episode.actions.len() >= EPISODE_ACTIONS_MAX
     {
-        return Err(Rejection::EpisodeFull);
+        return Err(Rejection::EpisodeFull.into());
     }
     let mind = session.mind.as_ref().expect("the shell installs the state's mind before commands");
     let moment = Moment {
@@ -119,57 +173,44 @@ fn say<D: Domain>(session: &Session<D>, text: &str) -> Result<Vec<Event>, Reject
     let answer = mind.interpret(moment, &utterance);
 
     let mut scene = D::Scene::clone(&episode.scene);
-    let mut adds = Adds { utterances: 1, ..Adds::default() };
     if let Outcome::Understood { program, .. } = &answer.outcome {
-        // A guess may be taught even where it ended the episode: it stands in this very batch.
-        adds.guess = answer.guessed().then(|| session.head().next());
         for step in &program.steps {
             domain
                 .step(&mut scene, &episode.task, step)
                 .expect("the interpreter ran this program on the same scene");
-            adds.actions += 1;
         }
     }
-    let mut events = vec![Event::Interpreted(Interpreted {
+    draft.add(Event::Interpreted(Interpreted {
         utterance,
         answer,
         actions_before: episode.actions.len() as u32,
         scene_after: domain.digest(&scene),
         mind: session.mind_digest(),
-    })];
-    if domain.achieved(&scene, &episode.task) {
-        events.push(end(session, Ending::Achieved, &adds));
+    }))?;
+    match domain.achieved(&scene, &episode.task) {
+        true => draft.add(end(&draft.state, Ending::Achieved)),
+        false => Ok(()),
     }
-    Ok(events)
 }
 
-/// What the batch that ends an episode itself adds to it.
-#[derive(Default)]
-struct Adds {
-    utterances: u32,
-    /// Primitives carried out.
-    actions: u32,
-    /// The utterance that ended it, where it was a guess.
-    guess: Option<Seq>,
-}
-
-fn end<D: Domain>(session: &Session<D>, ending: Ending, adds: &Adds) -> Event {
-    let episode = episode(&session.state);
-    let before = episode.unexplained.iter().map(|unexplained| unexplained.seq);
+/// The end of the present episode, right after everything that `state` knows.
+fn end<S, T>(state: &State<S, T>, ending: Ending) -> Event {
+    let episode = episode(state);
     Event::EpisodeEnded(EpisodeEnded {
         ending,
-        utterances: episode.utterances + adds.utterances,
-        actions: episode.actions.len() as u32 + adds.actions,
-        to_teach: before.chain(adds.guess).collect(),
+        utterances: episode.utterances,
+        actions: episode.actions.len() as u32,
+        to_teach: episode.unexplained.iter().map(|said| said.seq).collect(),
     })
 }
 
 fn teach<D: Domain>(
-    session: &Session<D>,
+    draft: &mut Draft<D>,
     explains: Seq,
     actions: &[u32],
     on_clash: OnClash,
-) -> Result<Vec<Event>, Rejection> {
+) -> Result<(), Refusal> {
+    let session = draft.session;
     let (state, episode) = (&session.state, episode(&session.state));
     let said = episode
         .unexplained
@@ -177,16 +218,16 @@ fn teach<D: Domain>(
         .find(|said| said.seq == explains)
         .ok_or(Rejection::NothingToTeach { explains })?;
     if said.settled {
-        return Err(Rejection::TaughtAlready { explains });
+        return Err(Rejection::TaughtAlready { explains }.into());
     }
     let utterance = said.utterance.clone();
     let (Some(&first), Some(&last)) = (actions.first(), actions.last()) else {
         let declined = DecompositionDeclined { explains, utterance };
-        return Ok(vec![Event::DecompositionDeclined(declined)]);
+        return draft.add(Event::DecompositionDeclined(declined));
     };
     let program = run_of_actions(episode, said, actions, first, last)?;
     if state.lessons.len() >= LESSONS_MAX {
-        return Err(Rejection::TooManyLessons);
+        return Err(Rejection::TooManyLessons.into());
     }
     let lesson = Lesson {
         utterance: utterance.clone(),
@@ -195,29 +236,28 @@ fn teach<D: Domain>(
         task: episode.task.clone(),
         mentioned: said.mentioned.clone(),
     };
-    let mut events = Vec::new();
     if let Some(clash) = clash(session, &lesson) {
         match (on_clash, clash.lesson) {
             (OnClash::Keep, Some(_)) => {}
-            (OnClash::Replace, Some(old)) => events.push(forget(session, old)?),
+            (OnClash::Replace, Some(old)) => draft.add(forget(session, old)?)?,
             // A seed cannot be unlearned, and a mind that lost one is refused in training.
             (OnClash::Ask, _) | (_, None) => {
                 return Err(Rejection::Clash {
                     utterance: clash.utterance,
                     known: clash.program,
                     lesson: clash.lesson,
-                });
+                }
+                .into());
             }
         }
     }
-    events.push(Event::DecompositionTaught(DecompositionTaught {
+    draft.add(Event::DecompositionTaught(DecompositionTaught {
         explains,
         utterance,
         program,
         first,
         last,
-    }));
-    Ok(events)
+    }))
 }
 
 fn run_of_actions<S, T>(
@@ -275,12 +315,11 @@ fn forget<D: Domain>(session: &Session<D>, lesson: Seq) -> Result<Event, Rejecti
     Ok(Event::LessonForgotten(LessonForgotten { lesson, utterance: live.lesson.utterance.clone() }))
 }
 
-/// A training on the live lessons, less the one that this very batch takes back.
-fn retrain<D: Domain>(session: &Session<D>, forgotten: Option<Seq>) -> Event {
-    let live = session.state.lessons.iter().map(|live| live.seq);
+/// A training on the lessons that are live after the draft.
+fn retrain<D: Domain>(draft: &Draft<D>) -> Event {
     Event::RetrainScheduled(RetrainScheduled {
-        recipe: session.recipe().digest(),
-        lessons: live.filter(|seq| Some(*seq) != forgotten).collect(),
+        recipe: draft.session.recipe().digest(),
+        lessons: draft.state.lessons.iter().map(|live| live.seq).collect(),
     })
 }
 
@@ -288,12 +327,12 @@ fn finish_retrain<D: Domain>(
     session: &Session<D>,
     recipe: Digest,
     outcome: &Result<(Digest, Report), String>,
-) -> Result<Vec<Event>, Rejection> {
+) -> Result<Event, Rejection> {
     match &session.state.training {
         Some(training) if training.recipe == recipe => {}
         _ => return Err(Rejection::NoTraining { recipe: recipe.short() }),
     }
-    Ok(vec![match outcome {
+    Ok(match outcome {
         Ok((mind, report)) => Event::RetrainCompleted(RetrainCompleted {
             recipe,
             mind: *mind,
@@ -301,7 +340,7 @@ fn finish_retrain<D: Domain>(
             code: Some(learning::code_digest()),
         }),
         Err(reason) => Event::RetrainFailed(RetrainFailed { recipe, reason: reason.clone() }),
-    }])
+    })
 }
 
 fn episode<S, T>(state: &State<S, T>) -> &Episode<S, T> {

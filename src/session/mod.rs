@@ -5,6 +5,7 @@ mod apply;
 mod command;
 mod decide;
 mod rejection;
+mod repeat;
 mod reply;
 mod snapshot;
 mod state;
@@ -15,9 +16,11 @@ use std::sync::Arc;
 pub use apply::Divergence;
 pub use command::{Command, OnClash, Query};
 pub use rejection::{Rejection, RejectionCode};
+pub use repeat::command_of;
 pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told, reply_of};
 pub use state::{LiveLesson, State};
 
+use self::decide::Refusal;
 use crate::events::{Batch, Durable, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::learning::{Lesson, Mind, Recipe};
@@ -39,11 +42,15 @@ pub struct Session<D: Domain> {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Proposed {
     Turn(Turn),
-    /// This request was answered before, by these records; nothing is to be appended.
+    /// This request id was answered before, by these records; nothing is to be appended. What is to
+    /// be answered now, [`Session::repeat`] says.
     Repeat {
         first: Seq,
         last: Seq,
     },
+    /// What was decided cannot be applied to the state: a defect of ours. Nothing is to be appended,
+    /// since no fold would accept it; the session is as it was and can go on.
+    Defect(Divergence),
 }
 
 /// Proposed events: not yet true. Becomes a reply through [`Session::settle`] alone.
@@ -67,7 +74,8 @@ impl<D: Domain> Session<D> {
         Session { domain, state: State::default(), recipe: None, mind: None }
     }
 
-    /// Decides what `command` deserves. Nothing changes.
+    /// Decides what `command` deserves. Nothing changes. The events of a turn were applied to a copy
+    /// of the state, so [`Session::settle`] will take them.
     ///
     /// - `request`: a repeated id gets [`Proposed::Repeat`] (invariant `ExactlyOnce`).
     /// - `at`: see [`Session::next_at`].
@@ -103,10 +111,14 @@ impl<D: Domain> Session<D> {
         if let Some(answered) = self.state.requests.find(request) {
             return Ok(Proposed::Repeat { first: answered.first, last: answered.last });
         }
-        check(command)?;
-        let events = decide::decide(self, command)?;
-        let batch = Batch { request, at, events };
-        Ok(Proposed::Turn(Turn { after: self.head(), batch }))
+        match decide::decide(self, command) {
+            Ok(events) => {
+                let batch = Batch { request, at, events };
+                Ok(Proposed::Turn(Turn { after: self.head(), batch }))
+            }
+            Err(Refusal::Rejected(rejection)) => Err(rejection),
+            Err(Refusal::Defect(divergence)) => Ok(Proposed::Defect(divergence)),
+        }
     }
 
     /// Makes a durable turn true and says what its person is told.

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Phase;
-use crate::ids::Seq;
+use crate::ids::{RequestId, Seq};
 use crate::language::{LiftedProgram, LiftedUtterance, UtteranceError};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
@@ -68,6 +68,11 @@ pub enum Rejection {
     NoTraining { recipe: String },
     #[error("the recipe cannot be read: {reason}")]
     Recipe { reason: String },
+    #[error(
+        "request id {request} was used before, for the command {used_for:?} (record {first}); \
+         send this one under a new id"
+    )]
+    RequestIdReused { request: RequestId, used_for: &'static str, first: Seq },
 }
 
 /// What a program may branch on.
@@ -85,6 +90,7 @@ pub enum RejectionCode {
     Clash,
     NoSuchLesson,
     LimitReached,
+    RequestIdReused,
     Internal,
 }
 
@@ -111,6 +117,7 @@ impl Rejection {
             Rejection::Clash { .. } => RejectionCode::Clash,
             Rejection::NoSuchLesson { .. } => RejectionCode::NoSuchLesson,
             Rejection::TooManyLessons | Rejection::EpisodeFull => RejectionCode::LimitReached,
+            Rejection::RequestIdReused { .. } => RejectionCode::RequestIdReused,
             Rejection::NoTraining { .. } | Rejection::Recipe { .. } => RejectionCode::Internal,
         }
     }

@@ -12,20 +12,22 @@ use crate::limits::REQUEST_RING;
 
 /// Everything a person's history has led to. Made by `apply` alone; `S` and `T` are the domain's
 /// scene and task.
+///
+/// What grows with a history stands behind `Arc`s: each command is folded into a [copy](State::scratch).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State<S, T> {
     pub head: HeadFields,
     pub last_at: Timestamp,
     pub phase: Phase,
-    pub opened: Option<Opened>,
+    pub opened: Option<Arc<Opened>>,
     pub episodes: u32,
     /// The present episode, or the last one while there is none.
     pub episode: Option<Episode<S, T>>,
     /// Lessons that were not taken back, in the order they were taught.
-    pub lessons: Vec<LiveLesson<S, T>>,
+    pub lessons: Vec<Arc<LiveLesson<S, T>>>,
     /// Lessons that were taken back while the present mind still knows them: needed should that
     /// mind have to be trained again.
-    pub retired: Vec<LiveLesson<S, T>>,
+    pub retired: Vec<Arc<LiveLesson<S, T>>>,
     /// The mind that answers now.
     pub mind: Option<Digest>,
     /// The lessons that mind was trained on.
@@ -73,9 +75,9 @@ pub struct Episode<S, T> {
     /// The type named last.
     pub mentioned: Option<Symbol>,
     pub utterances: u32,
-    pub actions: Vec<Action>,
+    pub actions: Vec<Arc<Action>>,
     /// The utterances that were not carried out or guessed, in the order they were said.
-    pub unexplained: Vec<Unexplained<S>>,
+    pub unexplained: Vec<Arc<Unexplained<S>>>,
 }
 
 /// A primitive that was carried out.
@@ -133,6 +135,29 @@ impl<S, T> Default for State<S, T> {
     }
 }
 
+impl<S: Clone, T: Clone> State<S, T> {
+    /// A copy to fold proposed events into: everything that an event reads, so without the requests.
+    ///
+    /// One reference is counted for each lesson, action and unexplained utterance; nothing else is
+    /// copied that grows.
+    pub(super) fn scratch(&self) -> State<S, T> {
+        State {
+            head: self.head,
+            last_at: self.last_at,
+            phase: self.phase,
+            opened: self.opened.clone(),
+            episodes: self.episodes,
+            episode: self.episode.clone(),
+            lessons: self.lessons.clone(),
+            retired: self.retired.clone(),
+            mind: self.mind,
+            trained: self.trained.clone(),
+            training: self.training.clone(),
+            requests: RequestRing::default(),
+        }
+    }
+}
+
 /// The last [`REQUEST_RING`] request ids and the records each of them led to: longer than any
 /// client's retry window (invariant `ExactlyOnce`).
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -161,5 +186,37 @@ impl RequestRing {
                 self.0.push_back(Answered { request, first: seq, last: seq });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::Program;
+
+    fn taught(lessons: u64) -> State<(), ()> {
+        let live = |seq| {
+            let lesson = Lesson {
+                utterance: Utterance::new("wash the mug").unwrap(),
+                program: Program { steps: Vec::new() },
+                scene: Arc::new(()),
+                task: Arc::new(()),
+                mentioned: None,
+            };
+            Arc::new(LiveLesson { seq: Seq::new(seq).unwrap(), lesson })
+        };
+        let mut state = State { lessons: (1..=lessons).map(live).collect(), ..State::default() };
+        state.requests.note(RequestId([7; 16]), Seq::FIRST);
+        state
+    }
+
+    #[test]
+    fn a_scratch_copy_shares_what_grows_and_knows_no_request() {
+        let state = taught(100);
+        let scratch = state.scratch();
+        let pairs = state.lessons.iter().zip(&scratch.lessons);
+        assert!(pairs.into_iter().all(|(one, other)| Arc::ptr_eq(one, other)));
+        assert_eq!(scratch.requests, RequestRing::default());
+        assert_eq!(State { requests: state.requests.clone(), ..scratch }, state);
     }
 }

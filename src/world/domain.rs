@@ -26,7 +26,8 @@ pub trait Domain: Send + Sync + 'static {
     /// What every user starts with.
     fn seeds(&self) -> &SeedSet;
 
-    /// Sets the stage for an episode. The same request gives the same scene and task for ever
+    /// Sets the stage for an episode. A drawn one never fulfils its goal already; a scene that a
+    /// person wrote may, and no episode is then started. The same request gives the same scene and task for ever
     /// (within one [`Domain::version`]).
     fn stage(&self, request: &Stage) -> Result<(Self::Scene, Self::Task), StageError>;
 
@@ -128,6 +129,9 @@ pub enum StageError {
     Task { task: String, reason: String, known: String },
     #[error("the scene file has an error at line {line}, column {column}: {reason}")]
     Scene { line: usize, column: usize, reason: String },
+    /// There would be nothing to do.
+    #[error("the goal holds already: {goal}; change the scene or name another task")]
+    Achieved { goal: String },
     #[error("no scene drawn from seed {seed} makes the task {task:?} possible: {reason}")]
     Unsolvable { task: String, seed: u64, reason: String },
 }

@@ -10,7 +10,7 @@ use apprentice::ids::{Digest, RequestId, TenantId, Timestamp, UserId};
 use apprentice::invariants::Invariant;
 use apprentice::learning::{self, Lesson, Mind, Recipe};
 use apprentice::replay::{Minds, keep_mind, keep_snapshot, mind_origin, rebuild};
-use apprentice::session::{Command, Outstanding, Phase, Proposed, Reply, Session, Told, reply_of};
+use apprentice::session::{Command, Outstanding, Phase, Proposed, Reply, Session, Told};
 use apprentice::store::{
     AppendError, EventLog, FaultPlan, FaultyLog, Keys, MemoryLog, Pending, SeededEntropy, Store,
 };
@@ -366,8 +366,14 @@ impl House {
                 let Ok(records) = self.store.log.read(stream, first) else { return Ok(()) };
                 let records: Vec<_> = records.take(wanted).filter_map(Result::ok).collect();
                 if records.len() == wanted {
-                    self.hear(person, asked, reply_of(&records))?;
+                    let reply = seat.session.repeat(command, &records);
+                    let reply =
+                        reply.map_err(|error| broken(Invariant::ExactlyOnce, error.to_string()))?;
+                    self.hear(person, asked, reply)?;
                 }
+            }
+            Ok(Proposed::Defect(divergence)) => {
+                return Err(broken(Invariant::FoldAgrees, divergence.to_string()));
             }
             Ok(Proposed::Turn(turn)) => {
                 let after = turn.after;

@@ -68,6 +68,7 @@ impl<D: Domain> Diary<D> {
         let turn = match propose(&self.session, command, RequestId(request), at)? {
             Proposed::Turn(turn) => turn,
             Proposed::Repeat { .. } => panic!("a fresh request id was answered before"),
+            Proposed::Defect(divergence) => panic!("{command:?}: {divergence}"),
         };
         let durable = self.store.log.append(&self.stream, turn.after, turn.batch).wait().unwrap();
         Ok(self.session.settle(&durable).unwrap())

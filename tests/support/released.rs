@@ -1,4 +1,5 @@
 //! Data directories that releases wrote.
+#![allow(dead_code)]
 
 use std::fs;
 use std::io::Read;

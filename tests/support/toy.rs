@@ -2,6 +2,7 @@
 //! trains in no time, and proves that nothing outside `world/` knows about mugs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 
 use apprentice::ids::Digest;
@@ -15,11 +16,12 @@ use apprentice::world::{
 };
 
 /// Bells ring until they are muted. Break one and the world panics, which is for tests of what the
-/// service makes of it; so are `brittle`, a world in which training a reranker panics, and `slow`,
-/// one in which it waits for a gate.
+/// service makes of it; so are `brittle`, a world in which training a reranker panics, `slow`, one
+/// in which it waits for a gate, and `fickle`, one that cannot say the same thing twice.
 pub struct Bells {
     brittle: bool,
     gate: Option<Arc<Gate>>,
+    fickle: Option<Arc<Fickle>>,
     signature: Signature,
     lexicon: Lexicon,
     seeds: SeedSet,
@@ -42,6 +44,13 @@ impl Gate {
         let closed = |is_open: &mut bool| !*is_open;
         drop(self.changed.wait_while(self.is_open.lock().unwrap(), closed).unwrap());
     }
+}
+
+/// Whether scenes have another digest each time that somebody asks.
+#[derive(Default)]
+pub struct Fickle {
+    pub is_on: AtomicBool,
+    asked: AtomicU64,
 }
 
 /// Bells that ring.
@@ -73,6 +82,11 @@ impl Bells {
     /// A world in which training a reranker waits until the gate is open.
     pub fn slow(gate: Arc<Gate>) -> Bells {
         Bells { gate: Some(gate), ..Bells::new() }
+    }
+
+    /// A world in which, while `fickle` is on, the decider and the fold can agree on no utterance.
+    pub fn fickle(fickle: Arc<Fickle>) -> Bells {
+        Bells { fickle: Some(fickle), ..Bells::new() }
     }
 
     /// A world without a word for breaking, so that no training can come to it.
@@ -113,7 +127,8 @@ impl Bells {
             ],
         };
         let operators = ["RING", "MUTE", "BREAK"].map(operator).to_vec();
-        Bells { brittle: false, gate: None, signature: Signature { operators }, lexicon, seeds }
+        let signature = Signature { operators };
+        Bells { brittle: false, gate: None, fickle: None, signature, lexicon, seeds }
     }
 }
 
@@ -197,7 +212,13 @@ impl Domain for Bells {
         vec![scene.len() as f32 / 3.0]
     }
     fn digest(&self, scene: &Ringing) -> Digest {
-        Digest::of(format!("{scene:?}").as_bytes())
+        let fickle = self.fickle.iter().filter(|fickle| fickle.is_on.load(Ordering::SeqCst));
+        let asked: Vec<u64> =
+            fickle.map(|fickle| fickle.asked.fetch_add(1, Ordering::SeqCst)).collect();
+        match &asked[..] {
+            [] => Digest::of(format!("{scene:?}").as_bytes()),
+            asked => Digest::of(format!("{scene:?} {asked:?}").as_bytes()),
+        }
     }
     fn goal(&self, task: &Ringing) -> String {
         let bells: Vec<&str> = task.iter().map(Symbol::as_str).collect();

@@ -14,8 +14,7 @@ use crate::language::Document;
 use crate::learning::Recipe;
 use crate::limits::BATCH_EVENTS_MAX;
 use crate::plain;
-use crate::replay::command_of;
-use crate::session::{Command, OnClash, Phase, Rejection, Session};
+use crate::session::{Command, OnClash, Phase, Rejection, Session, command_of};
 use crate::store::ReadError;
 use crate::world::{Domain, Stage};
 

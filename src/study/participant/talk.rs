@@ -186,7 +186,10 @@ impl<'a, T> Talk<'a, T> {
     ) -> Result<Heard, TalkError> {
         let reply = match self.command(Command::Say { utterance: words.to_owned() }) {
             Err(TalkError::Client(ClientError::Rejected { code, .. }))
-                if code != RejectionCode::StillLearning =>
+                if !matches!(
+                    code,
+                    RejectionCode::StillLearning | RejectionCode::RequestIdReused
+                ) =>
             {
                 self.said_max = self.turns.len();
                 return Ok(Heard::Refused);

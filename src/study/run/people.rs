@@ -250,7 +250,7 @@ fn goal(labels: &[&str], program: &Program) -> Option<String> {
     Some(format!("{} {thing} {place}", if same > 1 { "two" } else { "place" }))
 }
 
-/// The stage with that goal, if what was recorded achieves it there, and not before its last step.
+/// The stage with that goal, if it does not hold there yet, and what was recorded achieves it.
 fn with_goal(
     household: &Household,
     scene: &Scene,
@@ -264,6 +264,9 @@ fn with_goal(
     };
     let stage = Stage::Scene { scene: scene_file(scene, dirty).ok()?, task: task.clone() };
     let (mut scene, goal) = household.stage(&stage).ok()?;
+    if household.achieved(&scene, &goal) {
+        return None;
+    }
     household.plan(&scene, &goal)?;
     for step in &program.steps {
         household.step(&mut scene, &goal, step).ok()?;
