@@ -223,7 +223,7 @@ fn an_operator_follows_words_and_an_auditor_of_either_lab_sees_none_of_them() {
     let ada = connect(&service, &gateway, "ada");
     begin(&ada);
     say(&ada, 5);
-    let stream = *heads(&connect(&service, &auditor, "a")).keys().nth(1).unwrap();
+    let stream = heads(&connect(&service, &auditor, "a")).keys().nth(1).unwrap();
     let mut follower = Follower::plain(connect(&service, &operator, "o"), WithinTenant::new());
     let mut seen = Vec::new();
     drain(&mut follower, &heads(&connect(&service, &operator, "o")), &mut seen);

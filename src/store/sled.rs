@@ -15,14 +15,14 @@ pub(super) use self::cache::SledCache;
 pub(super) use self::check::{check_cache, check_log};
 pub(super) use self::read::{KEY_BYTES, chunk_key};
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use self::commit::{Committer, Job, Syncer};
 use self::read::{Frames, Records, frame_at, last_seqs};
@@ -42,6 +42,9 @@ use crate::limits::{COMMIT_QUEUE_BYTES_MAX, COMMIT_QUEUE_MAX, COMMIT_S_MAX};
 const CACHE_BYTES: u64 = 64 * 1024 * 1024;
 /// Streams with records have their records in the tree `events/<tenant>`.
 const TREE_PREFIX: &str = "events/";
+
+/// For how long a database that was dropped may keep its file.
+const LET_GO_MAX: Duration = Duration::from_secs(5);
 
 /// Whose records stand in the tree of that name; none for trees that hold no records.
 pub(super) fn tenant_of_tree(name: &[u8]) -> Option<TenantId> {
@@ -396,7 +399,19 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
         .flush_every_ms(None);
     remove_unfinished_snapshots(path)
         .map_err(|error| format!("an unfinished file of it cannot be removed: {error}"))?;
+    wait_until_let_go(&path.join("db"));
     guarded(|| config.open())?.map_err(|error| sentence(&error))
+}
+
+/// Waits for the threads of a database of this process that was dropped a moment ago: one that has
+/// written the last buffer may still hold the file, and its lock, for a moment. Whoever else holds it
+/// is `sled`'s to report.
+fn wait_until_let_go(file: &Path) {
+    let Ok(file) = File::open(file) else { return };
+    let began = Instant::now();
+    while matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && began.elapsed() < LET_GO_MAX {
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Removes what a process that was killed while the database wrote one of its own snapshots left of

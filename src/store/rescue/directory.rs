@@ -138,7 +138,8 @@ impl Rescue {
 
     /// The streams of all labs that may have this key.
     fn claims(&self, key: StreamKey) -> impl Iterator<Item = StreamId> {
-        let streams = self.tenants.iter().map(move |tenant| StreamId { tenant: tenant.clone(), key });
+        let streams =
+            self.tenants.iter().map(move |tenant| StreamId { tenant: tenant.clone(), key });
         streams.filter(|stream| self.named.contains(stream))
     }
 
@@ -204,7 +205,8 @@ impl Rescue {
     /// The records that continue `walk`, each with the walk behind it. The chain says whose they are:
     /// a record names the one before it by its digest.
     fn successors(&self, stream: &StreamId, walk: &Walk, acknowledged: bool) -> Found {
-        let mut pages = Pages::ALL.into_iter().map(|pages| self.follow(stream, walk, acknowledged, pages));
+        let mut pages =
+            Pages::ALL.into_iter().map(|pages| self.follow(stream, walk, acknowledged, pages));
         // What is wrong with a lab's own record says more than that another lab's does not fit.
         let first = pages.next().expect("there are pages to search");
         first.or_else(|reason| pages.find_map(Result::ok).ok_or(reason))

@@ -286,6 +286,21 @@ fn records_beyond_the_recorded_heads_are_kept() {
 }
 
 #[test]
+fn a_file_that_is_let_go_a_moment_later_is_waited_for() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(open(dir.path()).unwrap());
+    let held = fs::File::open(dir.path().join("log/db")).unwrap();
+    held.lock().unwrap();
+    let holder = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        drop(held);
+    });
+    let opened = open(dir.path()).map(drop);
+    holder.join().unwrap();
+    opened.unwrap();
+}
+
+#[test]
 fn a_missing_heads_file_or_database_is_reported() {
     let dir = tempfile::tempdir().unwrap();
     let store = open(dir.path()).unwrap();
