@@ -18,8 +18,8 @@ use crate::learning;
 use crate::limits::{MAILBOX_MAX, WAIT_S_MAX, WAITERS_MAX};
 use crate::sabotage;
 use crate::session::{
-    Command, Divergence, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session, Status,
-    Told, Turn,
+    Command, Divergence, Outstanding, Phase, Proposed, Query, RejectionCode, Reply, Session,
+    Status, Told, Turn,
 };
 use crate::store::AppendError;
 use crate::world::Domain;

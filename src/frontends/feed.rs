@@ -289,10 +289,8 @@ impl Subscribed {
             };
             let key = vouched(&watch.seal, &watch.passes, &mut frame);
             match (frame.split_first(), key) {
-                (Some((1, topic)), Some(key)) => {
-                    if self.topics.add(topic, key) {
-                        return Ok(Some(key));
-                    }
+                (Some((1, topic)), Some(key)) if self.topics.add(topic, key) => {
+                    return Ok(Some(key));
                 }
                 (Some((0, topic)), _) => self.topics.remove(topic),
                 // No subscription; whoever nobody vouched for is not there while the doorkeeper is.

@@ -111,6 +111,7 @@ impl<D: Domain> Session<D> {
         if let Some(answered) = self.state.requests.find(request) {
             return Ok(Proposed::Repeat { first: answered.first, last: answered.last });
         }
+        check(command)?;
         match decide::decide(self, command) {
             Ok(events) => {
                 let batch = Batch { request, at, events };
