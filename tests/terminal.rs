@@ -294,7 +294,7 @@ fn whatever_is_typed_gets_one_line_and_the_conversation_goes_on() {
         "300000 bytes; at most",
         "29999 bytes; at most",
         "not UTF-8 text: byte 0xff at position 1",
-        "control character",
+        "U+0000",
         "no words",
         "I'm sorry",
         "1  ",

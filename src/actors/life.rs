@@ -235,6 +235,16 @@ pub(super) fn wake<D: Domain>(
     })
 }
 
+/// Whether somebody new may be called that. People who were recorded keep the name that they have.
+///
+/// - errors: what to answer instead.
+pub(super) fn check_name(user: &UserId) -> Result<(), Response> {
+    user.check_new().map_err(|error| {
+        let message = format!("nobody new can be called that: {error}");
+        Response::error(ErrorCode::Refused, message)
+    })
+}
+
 /// The turn that opens the session of somebody new.
 ///
 /// - errors: what to answer instead.
@@ -243,11 +253,6 @@ pub(super) fn open<D: Domain>(
     session: &Session<D>,
     user: &UserId,
 ) -> Result<Turn, Box<Response>> {
-    // People who were recorded keep the name that they have; somebody new needs one like no other.
-    user.check_new().map_err(|error| {
-        let message = format!("nobody new can be called that: {error}");
-        Box::new(Response::error(ErrorCode::Refused, message))
-    })?;
     let command = Command::Open {
         user: user.clone(),
         recipe_text: life.recipe_text.clone(),

@@ -158,6 +158,10 @@ impl<D: Domain> UserActor<D> {
     ) -> Atomic<D> {
         let Stage::Awake(session) = &self.stage else { return Self::done() };
         let is_new = !session.is_open();
+        if let Some(Err(refused)) = is_new.then(|| life::check_name(&self.waking.user)) {
+            respond(answer, refused);
+            return Self::done();
+        }
         let at = session.next_at(self.life.now());
         // Rust cannot know it, but `propose` only reads: a panic leaves the session as it was.
         let proposed = catch_unwind(AssertUnwindSafe(|| {

@@ -49,6 +49,13 @@ impl<D: Domain> Draft<'_, D> {
     fn add(&mut self, event: Event) -> Result<(), Refusal> {
         let seq = self.session.state.head.seq + self.events.len() as u64 + 1;
         let seq = Seq::new(seq).expect("a head's successor is at least 1");
+        // The first command of somebody new is decided to know whether it is declined; nothing of it
+        // is appended before their session is open, and then it is decided again.
+        let opens = matches!(event, Event::SessionOpened(_));
+        if self.session.state.opened.is_none() && !opens {
+            self.events.push(event);
+            return Ok(());
+        }
         apply_event(&*self.session.domain, &mut self.state, seq, &event)
             .map_err(Refusal::Defect)?;
         self.events.push(event);

@@ -238,7 +238,7 @@ impl<'a> Person<'a> {
             10 | 11 => Command::FinishTeaching,
             12 | 13 => self.forget(),
             14 => match self.chance(20) {
-                true => Command::Close { reason: "enough\nof this".to_owned() },
+                true => Command::Close { reason: "enough of this".to_owned() },
                 false => Command::Say { utterance: " \t".to_owned() },
             },
             _ => Command::FinishRetrain { recipe: Digest::ZERO, outcome: Err("no".to_owned()) },
