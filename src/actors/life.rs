@@ -238,10 +238,10 @@ pub(super) fn wake<D: Domain>(
 /// Whether somebody new may be called that. People who were recorded keep the name that they have.
 ///
 /// - errors: what to answer instead.
-pub(super) fn check_name(user: &UserId) -> Result<(), Response> {
+pub(super) fn check_name(user: &UserId) -> Result<(), Box<Response>> {
     user.check_new().map_err(|error| {
         let message = format!("nobody new can be called that: {error}");
-        Response::error(ErrorCode::Refused, message)
+        Box::new(Response::error(ErrorCode::Refused, message))
     })
 }
 

@@ -159,7 +159,7 @@ impl<D: Domain> UserActor<D> {
         let Stage::Awake(session) = &self.stage else { return Self::done() };
         let is_new = !session.is_open();
         if let Some(Err(refused)) = is_new.then(|| life::check_name(&self.waking.user)) {
-            respond(answer, refused);
+            respond(answer, *refused);
             return Self::done();
         }
         let at = session.next_at(self.life.now());

@@ -13,7 +13,7 @@ use crate::limits::REQUEST_RING;
 /// Everything a person's history has led to. Made by `apply` alone; `S` and `T` are the domain's
 /// scene and task.
 ///
-/// What grows with a history stands behind `Arc`s: each command is folded into a [copy](State::scratch).
+/// What grows with a history stands behind `Arc`s: each command is folded into a copy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State<S, T> {
     pub head: HeadFields,
