@@ -228,7 +228,7 @@ fn said(arguments: &[&str], data: &Path) -> String {
 }
 
 #[test]
-fn whoever_reads_the_log_sees_which_times_were_held() {
+fn the_log_shows_which_times_were_held() {
     const HELD: &str = "time held: the clock read no later than the record before";
     let mut house = House::new(TODAY);
     let ada = house.service().connect(user("ada")).unwrap();

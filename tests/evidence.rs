@@ -1,6 +1,8 @@
 //! Whether a proof holds is said alike by the library, the command and a second reader in Python,
 //! over committed files good and bad. `UPDATE_GOLDEN=1` writes the files anew.
 
+#[path = "support/python.rs"]
+mod python;
 #[path = "evidence/vectors.rs"]
 mod vectors;
 
@@ -9,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use apprentice::evidence::{Proof, VerifierKey, verify};
+use python::python;
 use vectors::{Vector, key, vectors};
 
 fn root() -> &'static Path {
@@ -27,24 +30,6 @@ fn judged(proof: &[u8], since: Option<&[u8]>) -> u8 {
         Err(_) => 2,
         Ok(proof) => u8::from(verify(&proof, &key, since.as_deref()).is_err()),
     }
-}
-
-/// An interpreter that has the package for Ed25519.
-fn python() -> Option<PathBuf> {
-    let named = std::env::var_os("APPRENTICE_PYTHON").map(PathBuf::from);
-    let candidates = match named {
-        Some(named) => vec![named],
-        None => vec![root().join("target/python/bin/python"), PathBuf::from("python3")],
-    };
-    let found = candidates.into_iter().find(|python| {
-        let imports = Command::new(python).args(["-c", "import cryptography"]).output();
-        imports.is_ok_and(|output| output.status.success())
-    });
-    if found.is_none() {
-        assert!(std::env::var_os("CI").is_none(), "CI has no Python with cryptography");
-        eprintln!("skipped: no Python with cryptography (cargo xtask test makes one)");
-    }
-    found
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Nobody forges a line: characters that hide, end lines or drive a terminal are refused in what
 //! comes in, and what older versions recorded is shown escaped by every command that reads it.
 
+#[path = "support/python.rs"]
+mod python;
 mod support;
 
 use std::collections::BTreeMap;
@@ -23,6 +25,7 @@ use apprentice::store::{self, Store};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use python::python;
 use support::diary::Diary;
 use support::ran::run;
 use support::toy::config;
@@ -358,7 +361,7 @@ fn a_transcript_with_a_hidden_character_is_refused_with_its_place() {
 }
 
 #[test]
-fn whoever_was_recorded_with_an_odd_name_is_reached_and_sees_plain_lines() {
+fn a_person_recorded_with_an_odd_name_is_reached_and_sees_plain_lines() {
     let Old { data, .. } = &old();
     let typed = ":known\n:status\n:why\nboogie woogie\n:why\n:look\nx\u{202e}y\ndone\nskip\n";
     let ran = run(&["--data", data, "--user", "pat\u{202e}", "--seed", "3"], typed);
@@ -372,25 +375,6 @@ fn whoever_was_recorded_with_an_odd_name_is_reached_and_sees_plain_lines() {
     assert!(ran.out.contains("closed for good"), "{}", ran.out);
     let ran = run(&["erase", "--data", data, "--user", NAME], "");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-}
-
-/// An interpreter that has the package for Ed25519.
-fn python() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let named = std::env::var_os("APPRENTICE_PYTHON").map(PathBuf::from);
-    let candidates = match named {
-        Some(named) => vec![named],
-        None => vec![root.join("target/python/bin/python"), PathBuf::from("python3")],
-    };
-    let found = candidates.into_iter().find(|python| {
-        let imports = Process::new(python).args(["-c", "import cryptography"]).output();
-        imports.is_ok_and(|output| output.status.success())
-    });
-    if found.is_none() {
-        assert!(std::env::var_os("CI").is_none(), "CI has no Python with cryptography");
-        eprintln!("skipped: no Python with cryptography (cargo xtask test makes one)");
-    }
-    found
 }
 
 #[test]

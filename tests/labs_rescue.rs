@@ -4,6 +4,8 @@
 #[path = "support/chance.rs"]
 mod chance;
 mod support;
+#[path = "support/tree.rs"]
+mod tree;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -23,6 +25,7 @@ use apprentice::tenancy::Order;
 use chance::{below, number, seed};
 use support::diary::Diary;
 use support::toy::Bells;
+use tree::copy_tree;
 
 /// Every stream's framed records, sealed as they stand.
 type Everything = BTreeMap<StreamId, Vec<Vec<u8>>>;
@@ -431,17 +434,6 @@ fn of_a_damaged_directory_every_lab_keeps_a_prefix_of_its_own_and_is_told_what_i
     let whole = all.values().map(Vec::len).sum::<usize>() * usize::try_from(cases).unwrap();
     println!("{kept} of {whole} records of wounded directories were kept");
     assert!(kept * 10 > whole * 8, "{kept} of {whole}");
-}
-
-fn copy_tree(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        match entry.file_type().unwrap().is_dir() {
-            true => copy_tree(&entry.path(), &to.join(entry.file_name())),
-            false => drop(fs::copy(entry.path(), to.join(entry.file_name())).unwrap()),
-        }
-    }
 }
 
 /// An erased person's head stays what it was.

@@ -259,7 +259,7 @@ fn records_that_were_acknowledged_and_are_lost_are_told_with_the_directory_that_
 /// goal held already, with a scene of her own, and said "hello". That ended the episode, "hello" was
 /// not among the utterances to teach, and no fold took the record.
 #[test]
-fn whoever_an_ending_of_0_2_shut_out_comes_back() {
+fn a_person_that_an_ending_of_0_2_shut_out_comes_back() {
     let folder = released("shut-out-0.2", "data");
     let data = folder.path().display().to_string();
     let before = contents(Path::new(&data));

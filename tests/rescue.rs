@@ -4,6 +4,8 @@
 #[path = "support/chance.rs"]
 mod chance;
 mod support;
+#[path = "support/tree.rs"]
+mod tree;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -23,6 +25,7 @@ use apprentice::store::{self, AppendError, ImportError, SeededEntropy, Store, op
 use apprentice::world::Stage;
 use chance::{below, seed};
 use support::toy::Bells;
+use tree::copy_tree;
 
 fn dice() -> SeededEntropy {
     SeededEntropy::new(seed())
@@ -372,15 +375,4 @@ fn a_check_that_may_not_take_memory_says_nothing_that_could_be_believed() {
     assert!(!String::from_utf8_lossy(&starved.stdout).ends_with("end\n"), "{starved:?}");
     let fed = check("2000000000");
     assert_eq!(String::from_utf8_lossy(&fed.stdout), "end\n");
-}
-
-fn copy_tree(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        match entry.file_type().unwrap().is_dir() {
-            true => copy_tree(&entry.path(), &to.join(entry.file_name())),
-            false => drop(fs::copy(entry.path(), to.join(entry.file_name())).unwrap()),
-        }
-    }
 }

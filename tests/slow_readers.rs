@@ -1,4 +1,4 @@
-//! Memory is bounded whoever does not read: connections that ask and take no answer, subscribers
+//! Clients that do not read cannot fill the memory: connections that ask and take no answer, subscribers
 //! that ask for everything, connections without number. Real sockets; the program as people start
 //! it, whose memory is measured from outside.
 
