@@ -293,7 +293,7 @@ impl Subscribed {
                     return Ok(Some(key));
                 }
                 (Some((0, topic)), _) => self.topics.remove(topic),
-                // No subscription; whoever nobody vouched for is not there while the doorkeeper is.
+                // No subscription, or a connection that the doorkeeper did not vouch for.
                 _ => {}
             }
         }

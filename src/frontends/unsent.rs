@@ -127,7 +127,7 @@ mod tests {
         let bytes = |frames: &Vec<Parcel>| frames.len() * (FRAME + FRAME_COST);
         assert!(all.iter().map(bytes).sum::<usize>() <= MOST);
         let small = unsent.pack(&lab, Some((0, vec![200])), vec![0; 500]);
-        assert!(small.is_some(), "whoever reads gets the usual answer");
+        assert!(small.is_some(), "a client that reads gets the usual answer");
         drop((all, small));
         assert_eq!(fill(&unsent, &lab, 9).len(), share, "what was given back is there again");
         assert!(unsent.held().lines.is_empty(), "nothing is kept of connections that read");

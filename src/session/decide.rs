@@ -87,7 +87,7 @@ pub(super) fn decide<D: Domain>(
             draft.add(forget(session, *lesson)?)?;
             draft.add(retrain(&draft))?;
         }
-        // Else whoever mistypes a name would make a person of it, for good.
+        // A mistyped name must not become a person.
         (_, Command::Close { .. }) if session.state.opened.is_none() => {
             return Err(Rejection::NobodyThere.into());
         }

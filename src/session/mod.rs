@@ -90,8 +90,8 @@ impl<D: Domain> Session<D> {
         self.answer(command, request, at, Command::check_texts)
     }
 
-    /// Decides a recorded command again, as [`Session::propose`] would have: the rule for texts that
-    /// are said now is not held against what was said before it.
+    /// Decides a recorded command again, as [`Session::propose`] would have, but without the rule
+    /// for new texts: older versions recorded texts that it refuses.
     pub fn propose_recorded(
         &self,
         command: &Command,

@@ -92,8 +92,7 @@ impl Admissions {
         all.keys().cloned().collect()
     }
 
-    /// The register after what the wall clock reads now: whoever asks is told of no overlap that
-    /// has ended.
+    /// The register after what the wall clock reads now, so it shows no overlap that has ended.
     fn read(&self) -> RwLockReadGuard<'_, BTreeMap<TenantId, Standing>> {
         let held = || self.all.read().unwrap_or_else(PoisonError::into_inner);
         let all = held();
