@@ -141,11 +141,7 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
             assert!(errors.iter().all(|error| error.contains("key")), "{case}: {errors:?}");
         }
         (Some(path), Ending::Whole) => {
-            // The making of a key is tried again before anything else is, and the tree is signed
-            // again when it has grown.
-            let again = ["/cache/", "/keys/users", "/checkpoints"];
-            let fine = again.iter().any(|part| path.contains(part));
-            assert!(fine, "{case}: it went on as if nothing had happened");
+            assert!(may_pass(path), "{case}: it went on as if nothing had happened");
         }
         (None, ending) => assert!(matches!(ending, Ending::Whole), "{case}: {ending:?}"),
     }
@@ -175,6 +171,12 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
         Ending::Whole => counts.harmless += usize::from(what.is_some()),
     }
     counts.acknowledged += promised.len();
+}
+
+/// Whether nobody need notice a failure there: the making of a key is tried again before anything
+/// else is, and the tree is signed again when it has grown.
+fn may_pass(path: &str) -> bool {
+    ["/cache/", "/keys/users", "/checkpoints"].iter().any(|part| path.contains(part))
 }
 
 /// Whoever runs it gets a code that is not 0 and one clear sentence, and no panic.
@@ -225,7 +227,13 @@ fn live(folder: &Path, ledger: &Ledger, kind: &str, at: usize) -> Ending {
     // after the last answer.
     let limit = if whole { SOON } else { GONE };
     let errors = signals.errors.into_inner().unwrap();
-    match server.end(limit) {
+    // A fault that hit after the last answer is still to be said; a busy machine takes longer for it.
+    let ended = server.end(limit).or_else(|| {
+        let hit = std::fs::read_to_string(folder.join("mark")).ok();
+        let told = whole && kind != "count" && hit.is_some_and(|path| !may_pass(&path));
+        told.then(|| server.end(GONE)).flatten()
+    });
+    match ended {
         Some(ended) => Ending::Gone(ended),
         None if whole => Ending::Whole,
         None => Ending::Refused(errors),
