@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::check;
 use super::files::make_dir;
 use super::layout::{Former, LAYOUT, LAYOUT_FILE, Standing, bring_up, standing};
+use super::lock::DirLock;
 use super::open::{lock_existing, open_log};
 use super::sled::SledCache;
 use super::{CheckpointFeed, Entropy, Keys, OpenError, OsEntropy, Store};
@@ -96,7 +97,7 @@ impl PrivateCopy {
             path: lock.display().to_string(),
             reason: error.to_string(),
         })?;
-        let lock = super::open::lock(&self.dir, lock)?;
+        let lock = DirLock::of(&self.dir, lock)?;
         let keys = Keys::open_read_only(&self.of.join("keys"), Arc::new(OsEntropy));
         let keys = Arc::new(keys);
         let lock = Arc::new(lock);

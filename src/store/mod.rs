@@ -17,6 +17,7 @@ mod heads;
 mod import;
 mod keys;
 mod layout;
+mod lock;
 mod log;
 mod memory;
 mod models;

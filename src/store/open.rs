@@ -1,4 +1,4 @@
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -9,6 +9,7 @@ use super::closed::Part;
 use super::files::{make_dir, overwrite_and_remove, sync_dir, write_whole};
 use super::import;
 use super::layout::{self, CREATING_FILE, Former, LAYOUT, Standing, standing, write_layout};
+use super::lock::DirLock;
 use super::sled::{LogError, SledCache};
 use super::{
     CheckpointFeed, Damage, EventLog, KeyError, Keys, MemoryLog, ModelStore, OsEntropy, SledLog,
@@ -209,7 +210,7 @@ pub(super) fn open_log(
     dir: &Path,
     keys: Arc<Keys>,
     fresh: bool,
-    lock: Arc<File>,
+    lock: Arc<DirLock>,
     leave_mark: bool,
 ) -> Result<SledLog, OpenError> {
     let fail = Fail(dir);
@@ -220,29 +221,20 @@ pub(super) fn open_log(
     })
 }
 
-fn take_lock(dir: &Path) -> Result<File, OpenError> {
+fn take_lock(dir: &Path) -> Result<DirLock, OpenError> {
     let path = dir.join(LOCK_FILE);
     let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
     let file = opened.map_err(|error| Fail(dir).io(&path, &error))?;
-    lock(dir, file)
-}
-
-/// Locks an opened lock file, or says who is in the way.
-pub(super) fn lock(dir: &Path, file: File) -> Result<File, OpenError> {
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(OpenError::InUse { dir: dir.display().to_string() }),
-        Err(TryLockError::Error(error)) => Err(Fail(dir).io(&dir.join(LOCK_FILE), &error)),
-    }
+    DirLock::of(dir, file)
 }
 
 /// For tools that never make a directory: locks an existing one and checks its layout.
-pub(super) fn lock_existing(dir: &Path) -> Result<File, OpenError> {
+pub(super) fn lock_existing(dir: &Path) -> Result<DirLock, OpenError> {
     let path = dir.join(LOCK_FILE);
     let file = File::open(&path).map_err(|error| Fail(dir).io(&path, &error))?;
-    let file = lock(dir, file)?;
+    let lock = DirLock::of(dir, file)?;
     match standing(dir)? {
-        Standing::At(_) => Ok(file),
+        Standing::At(_) => Ok(lock),
         Standing::Fresh => {
             let found = "nothing that was ever used".to_owned();
             Err(OpenError::NotOurs { dir: Fail(dir).dir(), found })

@@ -30,6 +30,7 @@ use self::sizes::Sizes;
 use self::watch::{InHand, Watch};
 use super::closed::{ClosedMark, Part};
 use super::heads::{Heads, HeadsFile, HeadsRead};
+use super::lock::DirLock;
 use super::log::{Pending, ReadError, SealedRecords};
 use super::quiet::guarded;
 use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
@@ -68,7 +69,7 @@ pub struct SledLog {
     /// Left when the database is closed: fields are dropped in this order.
     mark: Option<ClosedMark>,
     /// Held until all of that is done.
-    _lock: Option<Arc<File>>,
+    _lock: Option<Arc<DirLock>>,
 }
 
 /// What the committer and the readers share.
@@ -125,7 +126,7 @@ impl SledLog {
         dir: &Path,
         keys: Arc<Keys>,
         fresh: bool,
-        lock: Arc<File>,
+        lock: Arc<DirLock>,
         leave_mark: bool,
     ) -> Result<SledLog, LogError> {
         let patience = Duration::from_secs(COMMIT_S_MAX);

@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use super::super::cache::Cache;
 use super::super::conformance::{batch, read_all, stream};
+use super::super::lock::DirLock;
 use super::super::{CacheCounts, Found, OsEntropy, Store, copy_private, open};
 use super::*;
 use crate::events::{Head, Record};
@@ -37,7 +38,7 @@ fn former_dir() -> (tempfile::TempDir, StreamId, Vec<Record>) {
 }
 
 fn cache_of(dir: &Path) -> SledCache {
-    let lock = fs::File::open(dir.join("LOCK")).unwrap();
+    let lock = DirLock::of(dir, fs::File::open(dir.join("LOCK")).unwrap()).unwrap();
     SledCache::open(&dir.join("cache"), Arc::new(lock)).unwrap()
 }
 
@@ -76,7 +77,8 @@ fn a_crash_between_copy_and_flip_leaves_the_old_layout_and_after_it_the_new() {
         let before = former_minds(dir.path());
         // A crash is everything dropped where it stands: nothing is undone and nothing finished.
         {
-            let lock = Arc::new(fs::File::open(dir.path().join("LOCK")).unwrap());
+            let lock = fs::File::open(dir.path().join("LOCK")).unwrap();
+            let lock = Arc::new(DirLock::of(dir.path(), lock).unwrap());
             let keys = Keys::open(&dir.path().join("keys"), Arc::new(OsEntropy)).unwrap();
             let keys = Arc::new(keys);
             let log =

@@ -8,6 +8,7 @@ use super::index::{Index, Pages, predecessor};
 use crate::events::{Head, Header};
 use crate::ids::{Digest, StreamId, StreamKey, TenantId};
 use crate::store::heads::{Heads, HeadsFile};
+use crate::store::lock::DirLock;
 use crate::store::{KeyError, Keys, OpenError, OsEntropy, Walk};
 
 /// A data directory, read without its database. Never written to.
@@ -23,7 +24,7 @@ pub struct Rescue {
     named: BTreeSet<StreamId>,
     /// The labs of those.
     tenants: BTreeSet<TenantId>,
-    _lock: Option<File>,
+    _lock: Option<DirLock>,
 }
 
 /// Why nothing at all can be read.
@@ -69,7 +70,7 @@ impl Rescue {
         };
         // A lost lock file keeps nobody from rescuing the rest.
         let lock = match File::open(dir.join("LOCK")) {
-            Ok(file) => Some(crate::store::open::lock(dir, file)?),
+            Ok(file) => Some(DirLock::of(dir, file)?),
             Err(_) => None,
         };
         let database = dir.join("log/db");

@@ -1,9 +1,10 @@
-use std::fs::{self, File};
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::super::cache::{Cache, Cached};
 use super::super::closed::{ClosedMark, Part};
+use super::super::lock::DirLock;
 use super::super::quiet::guarded;
 use super::open_database;
 
@@ -17,12 +18,12 @@ pub(in super::super) struct SledCache {
     /// Left when the database is closed: fields are dropped in this order.
     _mark: ClosedMark,
     /// Held until the database is closed.
-    _lock: Arc<File>,
+    _lock: Arc<DirLock>,
 }
 
 impl SledCache {
     /// Opens the cache in `dir`; one that does not open is replaced by an empty one.
-    pub(in super::super) fn open(dir: &Path, lock: Arc<File>) -> Result<SledCache, String> {
+    pub(in super::super) fn open(dir: &Path, lock: Arc<DirLock>) -> Result<SledCache, String> {
         let db = open_database(dir, CACHE_BYTES).or_else(|reason| {
             tracing::warn!(%reason, "the cache of minds and snapshots is damaged and starts afresh");
             if dir.exists() {
