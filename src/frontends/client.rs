@@ -435,6 +435,11 @@ impl Client {
             (Knock::NotAdmitted, Some(identity)) => {
                 ClientError::NotAdmitted { endpoint, key: z85::show(identity.key.public()) }
             }
+            // A service that asks for no key may break off as a wrong one does, but it lets in a client
+            // that brings none.
+            (Knock::BrokenOff, Some(_)) if knock(&endpoint, None, KNOCK) == Knock::LetIn => {
+                ClientError::NoKeyWanted { endpoint }
+            }
             (Knock::BrokenOff, Some(identity)) => {
                 ClientError::WrongServer { endpoint, server: z85::show(&identity.server) }
             }

@@ -410,9 +410,15 @@ pub(super) fn open_database(path: &Path, cache_bytes: u64) -> Result<::sled::Db,
 fn wait_until_let_go(file: &Path) {
     let Ok(file) = File::open(file) else { return };
     let began = Instant::now();
-    while matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && began.elapsed() < LET_GO_MAX {
+    while matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+        if began.elapsed() >= LET_GO_MAX {
+            return;
+        }
         std::thread::sleep(Duration::from_millis(1));
     }
+    // By name and not only by closing: a child that was forked a moment ago has this file, and with it
+    // the lock, until it runs its own program. If it fails, closing it is what is left.
+    let _ = file.unlock();
 }
 
 /// Removes what a process that was killed while the database wrote one of its own snapshots left of
