@@ -43,8 +43,13 @@ fn answering(criterion: &mut Criterion) {
         let mind = train(&domain, &recipe, &support::lessons(&domain, 56)).expect("it trains");
         group.bench_function(BenchmarkId::new(name, 100), |bench| {
             bench.iter(|| {
-                let moment =
-                    Moment { domain: &domain, scene: &scene, task: &task, mentioned: None };
+                let moment = Moment {
+                    domain: &domain,
+                    scene: &scene,
+                    task: &task,
+                    mentioned: None,
+                    handled: &[],
+                };
                 mind.interpret(moment, black_box(&utterance))
             });
         });

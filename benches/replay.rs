@@ -128,6 +128,7 @@ fn bare(domain: &Arc<Household>, records: &[Record]) -> (Duration, Duration) {
                     scene: &*episode.scene,
                     task: &*episode.task,
                     mentioned: episode.mentioned.as_ref(),
+                    handled: &[],
                 };
                 std::hint::black_box(mind.interpret(moment, &event.utterance));
                 interpreting += start.elapsed();

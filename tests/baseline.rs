@@ -52,6 +52,7 @@ impl Talk {
             scene: &self.scene,
             task: &self.task,
             mentioned: None,
+            handled: &[],
         };
         let answer = self.mind.interpret(moment, &Utterance::new(text).unwrap());
         let said = match answer.outcome {

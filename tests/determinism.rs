@@ -21,9 +21,9 @@ use apprentice::store;
 use apprentice::study::known_minds::{histories, lessons, stage, train_all};
 use apprentice::world::household::Household;
 
-const RECIPES: [&str; 5] = Recipe::BUILTIN;
+const RECIPES: [&str; 6] = Recipe::BUILTIN;
 /// One of each kind of parser; the halves of the last are in it.
-const KINDS: [&str; 3] = ["paper", "default", "seq2seq-grammar"];
+const KINDS: [&str; 3] = ["paper", "default-2", "seq2seq-grammar"];
 
 fn mind(recipe: &str, history: &str) -> Mind {
     let household = Household::new();
@@ -62,9 +62,9 @@ fn kernels_and_threads_do_not_change_a_bit() {
         }
         Kernel::force(None);
     }
-    let expected = digests("default");
+    let expected = digests("default-2");
     thread::scope(|scope| {
-        let started: Vec<_> = (0..8).map(|_| scope.spawn(|| digests("default"))).collect();
+        let started: Vec<_> = (0..8).map(|_| scope.spawn(|| digests("default-2"))).collect();
         for one in started {
             assert_eq!(one.join().unwrap(), expected);
         }

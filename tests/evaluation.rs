@@ -13,6 +13,7 @@ use apprentice::study::one_shot::one_shot;
 use apprentice::study::people::People;
 use apprentice::study::primitives::primitives;
 use apprentice::study::report::{Setting, Teachers};
+use apprentice::study::scenes::Staging;
 use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
@@ -383,6 +384,7 @@ fn slice(recipe: &str, steps: &Path, whole: &Path) -> Slice {
         threads: 2,
         progress: &(),
         teachers: Teachers::One,
+        staging: Staging::Plain,
         failures: 0,
         cases: 0,
     };

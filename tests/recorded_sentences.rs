@@ -128,7 +128,8 @@ fn measure(mind: &Mind, cases: &[Case], show: bool) -> BTreeMap<String, Tally> {
     let task = task();
     let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
     for Case { utterance, right, scene } in cases {
-        let moment = Moment { domain: &household, scene, task: &task, mentioned: None };
+        let moment =
+            Moment { domain: &household, scene, task: &task, mentioned: None, handled: &[] };
         let answer = mind.interpret(moment, utterance);
         let tally = tallies.entry(right.operator.to_string()).or_default();
         let verdict = match &answer.outcome {

@@ -95,6 +95,7 @@ fn recomputed<D: Domain>(diary: &Diary<D>, recipe: &Recipe) -> Vec<(u64, Outcome
                 scene: &*episode.scene,
                 task: &*episode.task,
                 mentioned: it.as_ref(),
+                handled: &episode.handled(),
             };
             let answer = mind.interpret(moment, &event.utterance);
             let done = |outcome: &Outcome| match outcome {
@@ -342,7 +343,7 @@ fn what_cannot_be_is_refused_with_what_can() {
         assert_eq!(ran.code, Some(2), "{more:?} {}{}", ran.out, ran.err);
         assert!(ran.err.contains(part), "{more:?}: {}", ran.err);
     };
-    refused(&["--with", "condition=papr"], "there are default, paper, grammar, seq2seq");
+    refused(&["--with", "condition=papr"], "there are default-1, default-2, paper, grammar");
     refused(&["--with", "speed=3"], "possible are tau=0.3");
     refused(&["--with", "tau=3"], "tau is 3; it is between 0 and 2");
     refused(&["--with", "recipe=/nowhere.toml"], "cannot be read as a file");

@@ -329,6 +329,20 @@ fn a_study_is_the_same_whoever_works_at_it_and_however_often_it_is_killed() {
 }
 
 #[test]
+fn the_second_teacher_that_ships_is_chosen_by_name() {
+    let dir = TempDir::new().unwrap();
+    let small =
+        ["--conditions", "grammar", "--users", "1", "--task-types", "place", "--episodes", "1"];
+    let [first, second] = ["teacher", "teacher-2"].map(|name| {
+        let out = dir.path().join(name);
+        run_well(&out, &[&small[..], &["--teacher", name]].concat());
+        assert!(fs::read_to_string(out.join("utterances.csv")).unwrap().lines().count() > 1);
+        fs::read_to_string(out.join("study.toml")).unwrap()
+    });
+    assert_ne!(first, second, "study.toml names another teacher");
+}
+
+#[test]
 fn a_study_that_makes_no_sense_is_refused_in_a_sentence() {
     let dir = TempDir::new().unwrap();
     let out = dir.path().join("study");
@@ -336,7 +350,7 @@ fn a_study_that_makes_no_sense_is_refused_in_a_sentence() {
         refused(&out, arguments, 2, expected);
         assert!(!out.exists(), "{arguments:?} left something behind");
     };
-    check(&["--conditions", "papper"], &["papper", "default, paper, grammar"]);
+    check(&["--conditions", "papper"], &["papper", "default-1, default-2, paper, grammar"]);
     check(&["--conditions", "paper,paper"], &["paper is named twice"]);
     check(&["--task-types", "cool,bake"], &["\"bake\"", "look, place, nested, two, clean"]);
     check(&["--teacher", "no/such/file"], &["no/such/file cannot be used"]);
@@ -438,7 +452,7 @@ fn recorded_people_say_their_own_sentences_and_teach_them() {
     let utterances = table(&out, "utterances.csv");
     let own = |row: &&BTreeMap<String, String>| row["utterance"].contains("freeze a bit");
     let of_ada = |row: &&BTreeMap<String, String>| {
-        own(row) && row["condition"] == "default" && row["user"] == "ada"
+        own(row) && row["condition"] == "default-2" && row["user"] == "ada"
     };
     let said: Vec<_> = utterances.iter().filter(of_ada).collect();
     assert_eq!(said.len(), 6);

@@ -341,7 +341,8 @@ fn bad_usage_is_one_sentence_and_code_2() {
     std::fs::write(&recipe, "name = \n").unwrap();
     let data = data.display().to_string();
     run(["--data", &data, "--recipe", recipe.to_str().unwrap()], "").refused(&["line 1"]);
-    run(["--data", &data, "--recipe", "none-such"], "").refused(&["none-such", "default, paper"]);
+    run(["--data", &data, "--recipe", "none-such"], "")
+        .refused(&["none-such", "default-1, default-2, paper"]);
     run(["--data", &data, "--user", ""], "").refused(&["user must not be empty"]);
     run(["--data", &data, "--log-filter", "=%="], "").refused(&["--log-filter"]);
     run(["talk", "--connect", "carrier-pigeon"], "").refused(&["carrier-pigeon"]);

@@ -25,7 +25,8 @@ use apprentice::ids::{
     Digest, PublicKey, RequestId, Seq, Signature, StreamKey, TenantId, Timestamp, UserId,
 };
 use apprentice::language::{
-    Answer, Discarded, Evidence, Exemplar, LiftedUtterance, Near, Outcome, Symbol,
+    Accounted, Answer, Discarded, Evidence, Exemplar, LiftedUtterance, Mood, Near, Outcome, Symbol,
+    Use,
 };
 use apprentice::limits::{FRAME_BYTES_MAX, UTTERANCE_BYTES_MAX};
 use apprentice::session::{
@@ -137,14 +138,54 @@ fn evidence() -> Evidence {
             reason: "the mug is not within reach".into(),
         }],
         reranked: 0,
-        answered_by: Vec::new(),
+        ..Evidence::default()
     }
 }
 
 fn answered(outcome: Outcome) -> Response {
-    let answer = Answer { outcome, evidence: evidence(), mentioned: Some(Symbol::new("Mug")) };
-    let utterance = "go to the mug".to_owned();
+    told("go to the mug", outcome, evidence(), Vec::new())
+}
+
+fn told(
+    utterance: &str,
+    outcome: Outcome,
+    evidence: Evidence,
+    chosen: Vec<Vec<Option<String>>>,
+) -> Response {
+    let (utterance, mentioned) = (utterance.to_owned(), Some(Symbol::new("Mug")));
+    let answer = Answer { outcome, evidence, mentioned, chosen };
     reply(3, vec![Told::Answered { seq: seq(3), utterance, answer, actions_before: 0 }])
+}
+
+fn chosen() -> Response {
+    let mug = "Mug 2".to_owned();
+    let program = "PICKUP Mug".parse().unwrap();
+    let outcome = Outcome::Understood { program, bindings: vec![vec![mug.clone()]] };
+    let words = [
+        ("please", Use::Frame),
+        ("pick", Use::Verb),
+        ("up", Use::Verb),
+        ("2", Use::Attribute),
+        ("mug", Use::Thing),
+    ];
+    let accounted = |(word, used): (&str, Use)| Accounted { word: word.to_owned(), used };
+    let evidence = Evidence {
+        lifted: vec![LiftedUtterance::parse("pick up <obj>")],
+        threshold: 0.375,
+        accounting: words.map(accounted).to_vec(),
+        ..Evidence::default()
+    };
+    told("please pick up mug 2", outcome, evidence, vec![vec![Some(mug)]])
+}
+
+fn asked() -> Response {
+    let evidence = Evidence {
+        lifted: vec![LiftedUtterance::parse("did you wash the <obj>")],
+        threshold: 0.375,
+        mood: Some(Mood::Asked { word: "did".to_owned() }),
+        ..Evidence::default()
+    };
+    told("did you wash the mug?", Outcome::NotSure, evidence, Vec::new())
 }
 
 fn status() -> Status {
@@ -241,6 +282,8 @@ fn responses() -> Vec<(&'static str, Response)> {
             }),
         ),
         ("not_sure", answered(Outcome::NotSure)),
+        ("chosen", chosen()),
+        ("asked", asked()),
         (
             "episode_ended",
             reply(

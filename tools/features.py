@@ -5,7 +5,7 @@ Run by hand; the output is committed. Needs numpy. Reads ../shared/data (see the
 household's names, words and seeds in data/household, and data/words/default.words. Writes
 
     data/household/habits.toml   how often each word stood in a clause that meant each primitive
-    data/recipes/default.toml    from its mark on: the weights of the two judges, the lists of words
+    data/recipes/default-1.toml    from its mark on: the weights of the two judges, the lists of words
 
 No sentence of the recordings is written: counts of single words, and weights.
 
@@ -1127,7 +1127,7 @@ def write(model):
                 row = "   "
             row += f' "{word}",'
         lines += [f"{name} = [", *text, row, "]"]
-    recipe = ROOT / "data/recipes/default.toml"
+    recipe = ROOT / "data/recipes/default-1.toml"
     kept, mark, _ = recipe.read_text().partition(MARK)
     recipe.write_text(kept + mark + "\n\n" + "\n".join(lines) + "\n")
     print(f"wrote {len(habits.counts)} habits and {len(PRIMITIVE_FEATURES)} + 2 x {len(LESSON_FEATURES)} weights")

@@ -13,8 +13,7 @@ def ask(**verb):
             response = msgpack.unpackb(socket.recv())
             if response["id"] != request["id"]: continue
             if "busy" not in response: return response
-            time.sleep(response["busy"]["retry_after_ms"] / 1000)
-            break
+            time.sleep(response["busy"]["retry_after_ms"] / 1000); break
     sys.exit("no answer from " + sys.argv[1])
 
 def start(task):
@@ -25,16 +24,17 @@ def start(task):
     print("goal:", ask(command={"start_episode": {"stage": stage}})["reply"]["told"][0]["episode_started"]["goal"])
 
 def say(utterance):
-    outcome = ask(command={"say": {"utterance": utterance}})["reply"]["told"][0]["answered"]["answer"]["outcome"]
-    print(">", utterance, "\n=", outcome["understood"]["program"] if "understood" in outcome else outcome)
+    answer = ask(command={"say": {"utterance": utterance}})["reply"]["told"][0]["answered"]["answer"]
+    outcome, evidence = answer["outcome"], answer["evidence"]
+    unused = [word["word"] for word in evidence.get("accounting", []) if word["as"] == "nothing"]
+    why = [evidence["mood"]] if "mood" in evidence else unused
+    print(">", utterance, "\n=", outcome["understood"]["program"] if "understood" in outcome else outcome, *why)
 
 start("place Mug SinkBasin")
 for utterance in ["sterilize the mug", "go to the mug", "pick up the mug", "go to the sink"]: say(utterance)
-ask(command="done")
-status = ask(query="status")["status"]
+ask(command="done"); status = ask(query="status")["status"]
 lesson = {"explains": status["to_teach"][0]["seq"], "actions": [action["number"] for action in status["actions"]]}
 print("taught:", ask(command={"teach": lesson})["reply"]["told"][0]["taught"]["program"])
 ask(command="finish_teaching")
 print("learned:", list(ask(query={"wait": {"seconds": 30}})["waited"]["told"][0]))
-start("place Apple SinkBasin")
-say("sterilize the apple")
+start("place Apple SinkBasin"); say("sterilize the apple")

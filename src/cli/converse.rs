@@ -24,7 +24,7 @@ pub struct Arguments {
     /// drawn.
     #[arg(long, value_name = "'clean Mug CounterTop'")]
     task: Vec<String>,
-    /// The recipe that a new person starts with: default, paper, grammar, seq2seq,
+    /// The recipe that a new person starts with: default, default-1, default-2, paper, grammar, seq2seq,
     /// seq2seq-grammar, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,

@@ -10,12 +10,14 @@ use super::{recipe, shown};
 use crate::learning::Recipe;
 use crate::plain;
 use crate::study::ablation::{Ablation, Variant, ablate};
+use crate::study::conversation::{ConversationError, conversation};
 use crate::study::corpus::{BadLine, Corpus};
 use crate::study::goals::goals;
 use crate::study::one_shot::one_shot;
 use crate::study::people::People;
 use crate::study::primitives::primitives;
 use crate::study::report::{Setting, Teachers};
+use crate::study::scenes::Staging;
 
 /// Bad lines shown; all are counted.
 const BAD_LINES_SHOWN: usize = 5;
@@ -35,15 +37,20 @@ Examples:
   apprentice eval --corpus utterances.jsonl.gz --protocol primitives --cases 10
   apprentice eval --corpus utterances.jsonl.gz --ablation tools/ablation.toml --people choosing
   apprentice eval --corpus utterances.jsonl.gz --ablation tools/additions.toml --recipe paper
+  apprentice eval --protocol conversation data/conversations/look --cases 20
 
 docs/evaluation.md describes the corpus, the protocols and every figure.
 
-Exit codes: 0 the figures are on standard output; 1 a training failed; 2 the corpus or the recipe
-cannot be used, or --strict met a bad line.")]
+Exit codes: 0 the figures are on standard output; 1 a training failed; 2 the corpus, a transcript or
+the recipe cannot be used, or --strict met a bad line.")]
 pub struct Arguments {
+    /// For --protocol conversation: a directory of transcripts (*.txt) with their scenes beside them.
+    #[arg(value_name = "DIR", conflicts_with_all = ["corpus", "ablation", "limit", "lessons",
+        "teachers", "people", "staging", "failures", "strict"])]
+    conversations: Option<PathBuf>,
     /// Recorded sentences, one JSON object a line; plain or gzipped.
-    #[arg(long, value_name = "FILE")]
-    corpus: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "conversations")]
+    corpus: Option<PathBuf>,
     /// What is measured.
     #[arg(long, value_enum, required_unless_present = "ablation")]
     protocol: Option<Protocol>,
@@ -51,11 +58,12 @@ pub struct Arguments {
     /// and show what primitives and one-shot gain by it. --limit counts rows; episodes are 24 a seed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["protocol", "failures", "cases", "lessons", "teachers"])]
     ablation: Option<PathBuf>,
-    /// The recipe that minds are trained with: default, paper, grammar, seq2seq, seq2seq-grammar, or
+    /// The recipe that minds are trained with: default, default-1, default-2, paper, grammar, seq2seq, seq2seq-grammar, or
     /// a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
-    /// Draws rows, scenes and the training seed; without it, seeds 1, 2 and 3 run.
+    /// Draws rows, scenes and the training seed; without it, seeds 1, 2 and 3 run. For
+    /// conversation: the training seed, instead of the recipe's own.
     #[arg(long)]
     seed: Option<u64>,
     /// Rows of each seed, or episodes for one-shot and goals; all rows, or 24 episodes, without it.
@@ -68,6 +76,10 @@ pub struct Arguments {
     /// Whose sentences these are: all of one person, or each of another.
     #[arg(long, value_name = "one|several", default_value = "one")]
     teachers: Teachers,
+    /// What scenes have: only what is meant needs (plain), or also what the words tell (held): the
+    /// thing in the hand that "take the mug to the sink" carries, and on what is turned off.
+    #[arg(long, value_name = "plain|held", default_value = "plain")]
+    staging: Staging,
     /// Whose sentences: a fixed two thirds to choose settings on, the held-out rest, or all.
     #[arg(long, value_name = "choosing|held-out|all", default_value = "all")]
     people: People,
@@ -75,7 +87,7 @@ pub struct Arguments {
     #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
     failures: usize,
     /// Also list so many failures of each verdict, drawn whatever the reason, as Markdown without
-    /// the recorded sentences (not with --json).
+    /// the recorded sentences; for conversation, the first lines of each class (not with --json).
     #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
     cases: usize,
     /// Stop at the first bad line of the corpus.
@@ -97,35 +109,35 @@ enum Protocol {
     OneShot,
     /// One sentence for a whole task is taught.
     Goals,
+    /// Transcripts that say what each utterance meant; the arguments name their directory.
+    Conversation,
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let text = recipe::load(&arguments.recipe)?;
     let recipe = Recipe::parse(&text).map_err(Failure::bad_input)?;
+    if let Some(directory) = &arguments.conversations {
+        return converse(&arguments, &recipe, directory);
+    }
+    let Some(path) = arguments.corpus.as_deref().filter(|_| !arguments.asks_for_conversations())
+    else {
+        return Err(Failure::bad_input(
+            "--protocol conversation takes a directory of transcripts instead of a corpus",
+        ));
+    };
     let variants = arguments.ablation.as_deref().map(|path| variants(path, &text)).transpose()?;
-    let mut corpus = Corpus::read(&arguments.corpus).map_err(Failure::bad_input)?;
+    let mut corpus = Corpus::read(path).map_err(Failure::bad_input)?;
     tell_bad_lines(&corpus.bad, arguments.strict)?;
     let bad_lines = corpus.bad.len();
     let people = arguments.people;
     corpus.steps.retain(|row| people.include(&row.user));
     corpus.goals.retain(|row| people.include(&row.user));
-    check_rows(&arguments, &corpus)?;
+    check_rows(&arguments, path, &corpus)?;
 
     let one = arguments.seed.map(|seed| [seed]);
     let seeds = one.as_ref().map_or(&SEEDS[..], |one| &one[..]);
     let bar = Bar::new("");
-    let setting = Setting {
-        recipe: &recipe,
-        seeds,
-        limit: arguments.limit.map(|limit| limit as usize),
-        people,
-        threads: arguments.threads as usize,
-        progress: &bar,
-        lessons: arguments.lessons as usize,
-        teachers: arguments.teachers,
-        failures: arguments.failures,
-        cases: arguments.cases,
-    };
+    let setting = arguments.setting(&recipe, seeds, &bar);
     let report = match (arguments.protocol, variants) {
         (_, Some((variants, adds))) => ablate(&setting, &corpus, &variants, adds)
             .map(|report| printed(&report, &arguments, bad_lines)),
@@ -134,13 +146,63 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         (Some(Protocol::Goals), None) => {
             goals(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
         }
-        (Some(Protocol::OneShot) | None, None) => {
+        (Some(Protocol::OneShot | Protocol::Conversation) | None, None) => {
             one_shot(&setting, &corpus).map(|report| printed(&report, &arguments, bad_lines))
         }
     };
     bar.finish();
     let report =
         report.map_err(|error| Failure::failed(format!("recipe {}: {error}", arguments.recipe)))?;
+    write(&report)
+}
+
+/// Runs the protocol on transcripts, which needs no corpus.
+fn converse(arguments: &Arguments, recipe: &Recipe, directory: &Path) -> Result<(), Failure> {
+    if !arguments.asks_for_conversations() {
+        return Err(Failure::bad_input(
+            "a directory of transcripts is measured with --protocol conversation",
+        ));
+    }
+    let bar = Bar::new("");
+    let one = arguments.seed.map(|seed| [seed]);
+    let seeds = one.as_ref().map_or(&[][..], |one| &one[..]);
+    let report = conversation(&arguments.setting(recipe, seeds, &bar), directory);
+    bar.finish();
+    let report = report.map_err(|error| match error {
+        ConversationError::Training(error) => {
+            Failure::failed(format!("recipe {}: {error}", arguments.recipe))
+        }
+        error => Failure::bad_input(error),
+    })?;
+    match arguments.json {
+        true => write(&(shown::json_pretty(&report) + "\n")),
+        false => write(&plain::escape_lines(&report.to_string())),
+    }
+}
+
+impl Arguments {
+    fn asks_for_conversations(&self) -> bool {
+        self.protocol == Some(Protocol::Conversation)
+    }
+
+    fn setting<'a>(&self, recipe: &'a Recipe, seeds: &'a [u64], bar: &'a Bar) -> Setting<'a> {
+        Setting {
+            recipe,
+            seeds,
+            limit: self.limit.map(|limit| limit as usize),
+            people: self.people,
+            threads: self.threads as usize,
+            progress: bar,
+            lessons: self.lessons as usize,
+            teachers: self.teachers,
+            staging: self.staging,
+            failures: self.failures,
+            cases: self.cases,
+        }
+    }
+}
+
+fn write(report: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     stdout.write_all(report.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {
         Failure::failed(format!("the report cannot be written to standard output: {error}"))
@@ -201,9 +263,9 @@ pub fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
 }
 
 /// - errors: a corpus that has nothing for the protocol.
-fn check_rows(arguments: &Arguments, corpus: &Corpus) -> Result<(), Failure> {
+fn check_rows(arguments: &Arguments, path: &Path, corpus: &Corpus) -> Result<(), Failure> {
     let (needed, found, other) = match arguments.protocol {
-        Some(Protocol::Primitives | Protocol::OneShot) | None => {
+        Some(Protocol::Primitives | Protocol::OneShot | Protocol::Conversation) | None => {
             ("sentences for single steps (u)", corpus.steps.len(), corpus.goals.len())
         }
         Some(Protocol::Goals) => {
@@ -215,7 +277,7 @@ fn check_rows(arguments: &Arguments, corpus: &Corpus) -> Result<(), Failure> {
     }
     Err(Failure::bad_input(format!(
         "the corpus {} has no {needed} of the people {}; of the other kind it has {other}",
-        arguments.corpus.display(),
+        path.display(),
         arguments.people
     )))
 }

@@ -44,7 +44,7 @@ pub struct Arguments {
     /// The service's own key, made when missing [default: keys/server.curve in the data directory]
     #[arg(long, value_name = "FILE", requires = "curve")]
     server_key: Option<PathBuf>,
-    /// The recipe that new people start with: default, paper, grammar, seq2seq,
+    /// The recipe that new people start with: default, default-1, default-2, paper, grammar, seq2seq,
     /// seq2seq-grammar, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,

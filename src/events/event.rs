@@ -229,7 +229,7 @@ impl EventKind {
     /// The version of the body that this binary writes.
     pub fn version(self) -> u16 {
         match self {
-            EventKind::RetrainCompleted | EventKind::KeyRetired => 2,
+            EventKind::Interpreted | EventKind::RetrainCompleted | EventKind::KeyRetired => 2,
             _ => 1,
         }
     }

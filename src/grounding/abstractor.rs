@@ -1,6 +1,9 @@
+use unicode_normalization::UnicodeNormalization;
+
+use super::frames::Framed;
 use super::names::Names;
 use super::settings::{Abstraction, Split};
-use crate::language::{Clause, Grammar, Mention, Utterance, Word, WordLists};
+use crate::language::{Clause, Grammar, Mention, Mood, Utterance, Word, WordLists, tokens};
 use crate::limits::{CLAUSES_MAX, MENTIONS_MAX};
 use crate::world::Lexicon;
 
@@ -8,6 +11,9 @@ use crate::world::Lexicon;
 const DETERMINERS: [&str; 9] = ["the", "a", "an", "its", "his", "her", "their", "your", "my"];
 /// A name is a fixture's when so many tenths of its uses are.
 const FIXTURE_TENTHS: u32 = 3;
+/// Before a number behind a name: "mug NUMBER two".
+const NUMBER: [&str; 3] = ["number", "no", "nr"];
+const NUMBERS: [&str; 6] = ["one", "two", "three", "four", "five", "six"];
 /// Words that open a phrase which says where a thing is.
 const LOCATION: &str = "from";
 
@@ -24,6 +30,12 @@ pub struct Abstractor<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Abstracted {
     pieces: Vec<Piece>,
+    /// What stood around the request and was taken away.
+    pub frames: Vec<String>,
+    /// Why it is no request, where it is none.
+    pub mood: Option<Mood>,
+    /// Words that ask for more, less or other than one step can say.
+    pub amounts: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +66,37 @@ impl<'a> Abstractor<'a> {
 
     /// Finds the mentions. From the [`MENTIONS_MAX`]-th on, names stay plain words.
     pub fn read(&self, utterance: &Utterance) -> Abstracted {
-        let tokens = utterance.tokens();
+        let said = match self.settings.composed {
+            true => tokens(&utterance.as_str().nfc().collect::<String>()),
+            false => utterance.tokens(),
+        };
+        let (lists, settings) = (self.settings.lists.as_ref(), self.settings);
+        let framed = match &settings.frames {
+            Some(frames) => {
+                let moods = settings.moods.as_ref();
+                let says = |word: &str| moods.is_some_and(|moods| moods.has(word));
+                frames.strip(said, lists, &says)
+            }
+            None => Framed::bare(said),
+        };
+        let mut framed = framed;
+        if let (Some(moods), true) = (&settings.moods, settings.frames.is_some()) {
+            moods.strip_reason(&mut framed);
+        }
+        let judged = settings.moods.as_ref().zip(lists);
+        let mood = judged.and_then(|(moods, lists)| moods.of(utterance.as_str(), &framed, lists));
+        let amounts =
+            judged.map(|(moods, lists)| moods.amounts(&framed.tokens, lists)).unwrap_or_default();
+        let Framed { tokens, frames } = framed;
+        let tokens = match lists.filter(|_| !settings.verbs.is_empty()) {
+            Some(lists) => settings.verbs.rewrite(tokens, lists, self.known),
+            None => tokens,
+        };
+        let pieces = self.pieces(&tokens);
+        Abstracted { pieces, frames, mood, amounts }
+    }
+
+    fn pieces(&self, tokens: &[String]) -> Vec<Piece> {
         let tokens: Vec<&str> = tokens.iter().map(String::as_str).collect();
         let mut pieces = Vec::with_capacity(tokens.len());
         let mut mentions = 0;
@@ -81,6 +123,7 @@ impl<'a> Abstractor<'a> {
                     mentions -= self.push_named(&mut pieces, mention, said);
                     at += count;
                     at += self.portions(&tokens[at..]);
+                    at += self.number(&tokens[at..], &mut pieces);
                 }
                 _ => {
                     pieces.push(Piece::Word(token.to_owned()));
@@ -88,7 +131,26 @@ impl<'a> Abstractor<'a> {
                 }
             }
         }
-        Abstracted { pieces }
+        pieces
+    }
+
+    /// "Mug 2": the number behind a name goes to what says which one.
+    fn number(&self, behind: &[&str], pieces: &mut [Piece]) -> usize {
+        let Some(Piece::Named { mention, attributes, said, .. }) = pieces.last_mut() else {
+            return 0;
+        };
+        let before = usize::from(behind.first().is_some_and(|word| NUMBER.contains(word)));
+        let Some(word) = behind.get(before) else { return 0 };
+        let spelt =
+            (before > 0).then(|| NUMBERS.iter().position(|number| number == word)).flatten();
+        let digits = word.bytes().all(|byte| byte.is_ascii_digit()).then(|| (*word).to_owned());
+        let number = digits.or(spelt.map(|place| (place + 1).to_string()));
+        let Some(number) = number.filter(|_| self.settings.numbers && !mention.pronoun) else {
+            return 0;
+        };
+        attributes.push(number);
+        said.extend(behind[..=before].iter().map(|word| (*word).to_owned()));
+        before + 1
     }
 
     /// Whether a name is said as a verb: where a clause begins, before an object.

@@ -1,10 +1,11 @@
 use std::collections::BTreeSet;
 
+use super::settings::Carrying;
 use crate::language::{
     Clause, Grammar, LiftedArg, LiftedProgram, Mention, Program, Roles, Step, Symbol, Word,
     WordLists,
 };
-use crate::world::Domain;
+use crate::world::{Domain, Edition};
 
 /// Which things fill the slots of an open program, by what the world allows: the first mention, in
 /// the order of the words, of a type that the operator can ever act on.
@@ -22,6 +23,17 @@ pub struct Arguments<'a, D: Domain> {
     pub here: Option<Symbol>,
     /// What was named last before this clause.
     pub last: Option<&'a Symbol>,
+    /// The types of what was acted on, newest first.
+    pub recent: Vec<Symbol>,
+    /// Per mention whether nothing of its likeliest type is in the scene.
+    pub absent: Vec<bool>,
+    /// Nouns of parts that many things have.
+    pub parts: Option<&'a BTreeSet<String>>,
+    /// Whether several things that are named side by side each get the operator, and a pronoun means
+    /// what the operator can work on.
+    pub accounts: bool,
+    /// Of the domain's words.
+    pub edition: Edition,
 }
 
 /// A way to fill an open program.
@@ -36,7 +48,7 @@ pub struct Filling {
 impl<D: Domain> Arguments<'_, D> {
     /// - returns: `None` when the words leave a slot open.
     pub fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
-        let roles = &self.domain.lexicon().roles;
+        let roles = &self.domain.lexicon(self.edition).roles;
         let slot = |arg: &LiftedArg| matches!(arg, LiftedArg::Slot { .. });
         match program.steps.as_slice() {
             [step] if step.args.iter().all(slot) => match step.args.len() {
@@ -44,8 +56,22 @@ impl<D: Domain> Arguments<'_, D> {
                 2 if roles.puts(&step.operator) => self.put(&step.operator),
                 _ => self.in_turn(roles, program),
             },
-            _ => self.in_turn(roles, program),
+            _ => self.each_in_turn(program).or_else(|| self.in_turn(roles, program)),
         }
+    }
+
+    /// A lesson about one thing, for things that are named side by side: "wash the apple and the
+    /// plate".
+    fn each_in_turn(&self, program: &LiftedProgram) -> Option<Filling> {
+        if !self.accounts || program.slots() != 1 || !self.is_next_to(1) {
+            return None;
+        }
+        let joined = (1..self.types.len()).take_while(|&place| self.is_next_to(place)).count();
+        let kinds = self.types[..=joined].iter().map(|kinds| kinds.first().cloned());
+        let each = kinds.map(|kind| program.fill(&[kind?], self.held.as_ref()));
+        let programs: Vec<Program> = each.collect::<Option<_>>()?;
+        let steps = programs.into_iter().flat_map(|program| program.steps).collect();
+        Some(Filling { programs: vec![Program { steps }], penalty: 0.0 })
     }
 
     fn one(&self, roles: &Roles, operator: &Symbol) -> Option<Filling> {
@@ -71,10 +97,20 @@ impl<D: Domain> Arguments<'_, D> {
                 if roles.takes(operator) && self.is_joined(place + 1) && another() {
                     return None;
                 }
+                // "Pick up the … next to the mug": what it is about has no name.
+                if self.accounts && roles.takes(operator) && self.is_landmark(place) {
+                    return None;
+                }
+                if self.accounts && self.is_next_to(place + 1) {
+                    return self.side_by_side(operator, place);
+                }
                 return Some(filling(operator, fitting, place as f32));
             }
-            if roles.is_door(operator) && self.is_pronoun(place) {
-                let here = self.fitting(operator, 0, self.here.as_slice());
+            if (roles.is_door(operator) || (self.accounts && works)) && self.is_pronoun(place) {
+                let mut here = self.fitting(operator, 0, self.here.as_slice());
+                if self.accounts {
+                    here.extend(self.fitting(operator, 0, &self.recent));
+                }
                 return Some(filling(operator, here, place as f32))
                     .filter(|f| !f.programs.is_empty());
             }
@@ -92,6 +128,162 @@ impl<D: Domain> Arguments<'_, D> {
         };
         let fitting = self.fitting(operator, 0, unnamed.cloned().as_slice());
         Some(filling(operator, fitting, penalty)).filter(|f| !f.programs.is_empty())
+    }
+
+    /// "Open the fridge and the microwave": a step for each.
+    fn side_by_side(&self, operator: &Symbol, first: usize) -> Option<Filling> {
+        let joined = (first + 1..self.types.len()).take_while(|&place| self.is_next_to(place));
+        let kinds = std::iter::once(first)
+            .chain(joined)
+            .map(|place| self.fitting(operator, 0, &self.types[place]).into_iter().next());
+        let kinds: Vec<Symbol> = kinds.collect::<Option<_>>()?;
+        let step = |kind: Symbol| Step { operator: operator.clone(), args: vec![kind] };
+        let steps = kinds.into_iter().map(step).collect();
+        Some(Filling { programs: vec![Program { steps }], penalty: first as f32 })
+    }
+
+    /// The things that were named as what to act on, and that the program does not use.
+    pub fn passed_over(&self, program: &Program) -> Vec<String> {
+        let uses = |kind: &Symbol| program.steps.iter().any(|step| step.args.contains(kind));
+        let mut left = Vec::new();
+        // "As well as the drawer" is as much as "and the drawer".
+        const JOINING: [&str; 6] = ["plus", "well", "followed", "along", "together", "including"];
+        // Whether the mention before was named as where something is.
+        let mut aside = false;
+        for (place, mention) in self.clause.mentions.iter().enumerate() {
+            let used = self.types[place].iter().chain(&mention.types).any(|kind| {
+                // What is in the hand comes along.
+                uses(kind) || self.held.as_ref() == Some(kind)
+            });
+            aside = match self.between(place).as_slice() {
+                before if self.is_side_by_side(place, before) => aside,
+                before if before.iter().any(|word| JOINING.contains(word)) => false,
+                before => !self.is_object(place, before),
+            };
+            if !used && !aside && !mention.pronoun {
+                left.push(mention.surface.clone());
+            }
+        }
+        left
+    }
+
+    /// Whether a mention is named side by side with the one before it.
+    fn is_next_to(&self, place: usize) -> bool {
+        place < self.types.len() && self.is_side_by_side(place, &self.between(place))
+    }
+
+    /// Whether a mention is joined to the one before it, with a mark or a joining word.
+    fn is_side_by_side(&self, place: usize, before: &[&str]) -> bool {
+        place > 0
+            && (before.is_empty()
+                || before.iter().all(|word| {
+                    self.lists.cuts.contains(*word) || self.lists.adverbs.contains(*word)
+                }))
+    }
+
+    /// Whether nothing but a verb and its particles stands before a mention.
+    fn is_object(&self, place: usize, before: &[&str]) -> bool {
+        let aside = |word: &&str| {
+            self.lists.passed.contains(*word)
+                || self.lists.verb_particles.contains(*word)
+                || self.lists.adverbs.contains(*word)
+                || self.lists.cuts.contains(*word)
+        };
+        let verb =
+            |word: &&str| self.lists.verbs.contains(*word) || self.lists.noun_verbs.contains(*word);
+        // "The bowl with the sliced tomato": behind a preposition it says where or how.
+        if before.iter().any(|word| self.lists.stop.contains(*word) && !aside(word)) {
+            return false;
+        }
+        let last = before.iter().rev().find(|word| !aside(word));
+        last.is_some_and(|word| place == 0 || verb(word))
+    }
+
+    /// What taking a thing somewhere means: never a walk without it.
+    ///
+    /// - `operator`: as what the clause is read.
+    /// - `last`: whether nothing more is asked for behind this clause.
+    /// - returns: none when the clause is about nothing of the kind.
+    pub fn carry(&self, carrying: &Carrying, operator: &Symbol, last: bool) -> Option<Filling> {
+        let roles = &self.domain.lexicon(self.edition).roles;
+        let operators = [&roles.going, &roles.taking, &roles.putting].map(Option::as_ref);
+        let [Some(going), Some(taking), Some(putting)] = operators else { return None };
+        let (leaves, place) = self.carries(carrying)?;
+        let thing = self.fitting(taking, 0, self.types.first()?).into_iter().next()?;
+        let step = |operator: &Symbol, args: Vec<Symbol>| Step { operator: operator.clone(), args };
+        let in_hand = self.held.as_ref() == Some(&thing);
+        let mut steps = Vec::new();
+        if !in_hand {
+            steps.push(step(taking, vec![thing.clone()]));
+        }
+        if place.is_none() && !roles.goes(operator) {
+            return None;
+        }
+        let Some(place) = place else {
+            return (!in_hand).then(|| Filling { programs: vec![Program { steps }], penalty: 0.0 });
+        };
+        let kinds = match self.is_pronoun(place) {
+            true => self.here.as_slice(),
+            false => self.types[place].as_slice(),
+        };
+        let goal = self.fitting(putting, 1, kinds).into_iter().find(|kind| *kind != thing);
+        match goal.filter(|_| last && (leaves || !in_hand)) {
+            Some(goal) => steps.push(step(putting, vec![thing, goal])),
+            None => {
+                let goal = kinds.iter().find(|kind| **kind != thing)?;
+                steps.push(step(going, vec![goal.clone()]));
+            }
+        }
+        Some(Filling { programs: vec![Program { steps }], penalty: 0.0 })
+    }
+
+    /// Whether the verb leaves what it carries, and which mention is where to; none for another verb.
+    fn carries(&self, carrying: &Carrying) -> Option<(bool, Option<usize>)> {
+        let grammar = Grammar {
+            lists: self.lists,
+            adjectives: &self.domain.lexicon(self.edition).adjectives,
+        };
+        let verb = grammar.main_verb(&self.clause.lifted.words)?.word;
+        let leaves = carrying.leaving.contains(&verb);
+        if !leaves && !carrying.keeping.contains(&verb) {
+            return None;
+        }
+        let direct = self
+            .before(0)
+            .iter()
+            .all(|word| self.lists.passed.contains(*word) || !self.lists.stop.contains(*word));
+        let purpose = self.clause.words.windows(2).any(|two| {
+            (self.lists.purposes.contains(&two[0]) && self.lists.verbs.contains(&two[1]))
+                || (two[0] == "for" && two[1].ends_with("ing"))
+        });
+        if !direct || purpose || self.is_joined(1) {
+            return None;
+        }
+        // "The cup on the desk" is taken from there, "into the sink" is where to.
+        let says_to =
+            |word: &str| self.lists.destination.contains(word) || matches!(word, "into" | "onto");
+        let says_in = |word: &str| self.lists.inside.contains(word) || word == "on";
+        let behind = |place: usize, says: &dyn Fn(&str) -> bool| {
+            let before = self.before(place);
+            let Some((last, rest)) = before.split_last() else { return false };
+            let aside = |word: &&str| {
+                self.lists.leaving.contains(*word) || self.lists.landmarks.contains(*word)
+            };
+            says(last) && !rest.iter().any(|word| aside(word) || says_in(word))
+        };
+        let places = 1..self.types.len();
+        let to = places.clone().find(|&place| behind(place, &says_to));
+        let place = to.or_else(|| places.clone().find(|&place| leaves && behind(place, &says_in)));
+        // "Carry the tomato with the plate to the sink" says more than that.
+        let explained = |between: usize| {
+            let before = self.before(between);
+            let from = before.last().is_some_and(|word| {
+                self.lists.leaving.contains(*word) || matches!(*word, "on" | "in" | "of")
+            });
+            from || self.is_landmark(between)
+        };
+        let more = place.is_some_and(|place| (1..place).any(|between| !explained(between)));
+        (!more && (place.is_some() || self.types.len() == 1)).then_some((leaves, place))
     }
 
     /// The first mention that something goes "to", else the first.
@@ -119,6 +311,11 @@ impl<D: Domain> Arguments<'_, D> {
             return None;
         }
         let alone = self.types.len() == 1;
+        let first = order.first().map(|(_, place)| *place);
+        let several = |first: &usize| self.is_next_to(first + 1) && !self.is_landmark(*first);
+        if let Some(first) = first.filter(|first| self.accounts && several(first)) {
+            return self.side_by_side(operator, first);
+        }
         order.into_iter().find_map(|(_, place)| {
             let kinds = self.types.get(place)?.iter();
             let kinds: Vec<Symbol> =
@@ -139,6 +336,9 @@ impl<D: Domain> Arguments<'_, D> {
         };
         let mut own = (0..named).find(is_own);
         let mut penalty = 0.0;
+        if let (true, None, Some(other)) = (self.accounts, own, self.another_thing(operator)) {
+            return Some(other);
+        }
         if own.is_none() && !self.names_unknown() {
             let placed = self.lists.onto.iter().any(|word| says(word))
                 || self.lists.inside.iter().any(|word| says(word));
@@ -162,6 +362,24 @@ impl<D: Domain> Arguments<'_, D> {
         let mut rest: Vec<usize> =
             (0..named).filter(|place| Some(*place) != own && !leaves(place)).collect();
         rest.sort_by_key(|&place| self.is_landmark(place));
+        // "On the top shelf of the fridge", and the fridge has no shelf of its own.
+        if let Some(&first) = rest.first().filter(|&&first| self.is_part(first)) {
+            let whole = |place: &usize| {
+                let before = self.before(*place);
+                let of = before
+                    .last()
+                    .is_some_and(|word| *word == "of" || self.lists.inside.contains(*word));
+                of && *place > first && !self.absent.get(*place).is_some_and(|absent| *absent)
+            };
+            match rest.iter().any(whole) {
+                true => rest.retain(|place| *place != first),
+                false if self.just_opened(operator) => {
+                    let here = self.here.as_ref().filter(|here| **here != held)?;
+                    return Some(Filling { programs: vec![put(here)], penalty });
+                }
+                false => {}
+            }
+        }
         for (skipped, place) in rest.iter().enumerate() {
             // Next to the cup is where the robot stands rather than in the cup.
             let stands = !self.fitting(operator, 1, self.here.as_slice()).is_empty();
@@ -172,8 +390,13 @@ impl<D: Domain> Arguments<'_, D> {
                 true => self.here.as_slice(),
                 false => self.types[*place].as_slice(),
             };
+            let named = kinds.iter().find(|kind| **kind != held).cloned();
             let mut kinds = self.fitting(operator, 1, kinds);
             kinds.retain(|kind| *kind != held);
+            // What nothing can be put on is said to be so by the world, and nothing else is taken.
+            if self.accounts && kinds.is_empty() && self.is_place(*place) {
+                kinds.extend(named);
+            }
             if !kinds.is_empty() {
                 let programs = kinds.iter().map(put).collect();
                 return Some(Filling { programs, penalty: penalty + 0.5 * skipped as f32 });
@@ -183,6 +406,39 @@ impl<D: Domain> Arguments<'_, D> {
         let here = here.first().filter(|kind| **kind != held)?;
         let penalty = if rest.is_empty() { penalty } else { penalty + 1.0 };
         Some(Filling { programs: vec![put(here)], penalty })
+    }
+
+    /// Whether a mention is called as parts of many things are, and nothing of its type is here.
+    fn is_part(&self, place: usize) -> bool {
+        let part = |parts: &BTreeSet<String>| {
+            let name = self.said(place).map_or("", |mention| mention.surface.as_str());
+            name.rsplit(' ').next().is_some_and(|last| parts.contains(last))
+        };
+        self.absent.get(place) == Some(&true) && self.parts.is_some_and(part)
+    }
+
+    /// Whether the robot stands at something that holds things and was acted on last.
+    fn just_opened(&self, operator: &Symbol) -> bool {
+        let here = self.here.as_ref().filter(|here| self.recent.first() == Some(here));
+        !self.fitting(operator, 1, here.cloned().as_slice()).is_empty()
+    }
+
+    /// Whether a mention stands right behind a word that says where something is put.
+    fn is_place(&self, place: usize) -> bool {
+        let before = self.before(place);
+        before.last().is_some_and(|word| {
+            let onto = self.lists.onto.contains(*word) || self.lists.inside.contains(*word);
+            onto && !self.lists.destination.contains(*word)
+        }) && !self.is_landmark(place)
+    }
+
+    /// "Put the mug on the table" with something else in the hand: the world says so.
+    fn another_thing(&self, operator: &Symbol) -> Option<Filling> {
+        let named = |place: usize| self.types.get(place).and_then(|kinds| kinds.first()).cloned();
+        let direct = self.is_object(0, &self.between(0)) && !self.is_pronoun(0);
+        let (thing, place) = (named(0).filter(|_| direct)?, named(1)?);
+        let step = Step { operator: operator.clone(), args: vec![thing, place] };
+        Some(Filling { programs: vec![Program { steps: vec![step] }], penalty: 0.0 })
     }
 
     /// Each slot in turn takes the first mention left that fits everything it is used for; what is
@@ -263,7 +519,16 @@ impl<D: Domain> Arguments<'_, D> {
     /// The words between the mention before a place and the one at it, without determiners, and
     /// without adjectives right before it; for the place behind the last mention, those to the end.
     fn before(&self, place: usize) -> Vec<&str> {
-        let adjectives = &self.domain.lexicon().adjectives;
+        let adjectives = &self.domain.lexicon(self.edition).adjectives;
+        let mut found = self.between(place);
+        while found.last().is_some_and(|word| adjectives.iter().any(|a| a == word)) {
+            found.pop();
+        }
+        found
+    }
+
+    /// As [`Arguments::before`], with the adjectives: "the knife NEAR the bottle".
+    fn between(&self, place: usize) -> Vec<&str> {
         let mut slot = 0;
         let mut found = Vec::new();
         for word in &self.clause.lifted.words {
@@ -274,9 +539,6 @@ impl<D: Domain> Arguments<'_, D> {
             }
         }
         found.retain(|word| !self.lists.determiners.contains(*word));
-        while found.last().is_some_and(|word| adjectives.iter().any(|a| a == word)) {
-            found.pop();
-        }
         found
     }
 
@@ -325,7 +587,7 @@ impl<D: Domain> Arguments<'_, D> {
 
     /// Whether words that name nothing known stand between the verb and the first preposition.
     fn names_unknown(&self) -> bool {
-        let adjectives = &self.domain.lexicon().adjectives;
+        let adjectives = &self.domain.lexicon(self.edition).adjectives;
         let grammar = Grammar { lists: self.lists, adjectives };
         let words = &self.clause.lifted.words;
         let after = grammar.main_verb(words).map_or(0, |verb| verb.at + 1);

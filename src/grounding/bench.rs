@@ -12,7 +12,9 @@ use crate::language::{
     Utterance,
 };
 use crate::parser::{Parse, Scored, SemanticParser};
-use crate::world::{Domain, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View};
+use crate::world::{
+    Domain, Edition, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
+};
 
 pub struct Bench {
     signature: Signature,
@@ -125,7 +127,7 @@ impl Domain for Bench {
     fn signature(&self) -> &Signature {
         &self.signature
     }
-    fn lexicon(&self) -> &Lexicon {
+    fn lexicon(&self, _: Edition) -> &Lexicon {
         &self.lexicon
     }
     fn seeds(&self) -> &SeedSet {
@@ -137,7 +139,7 @@ impl Domain for Bench {
 
     fn step(&self, scene: &mut Scene, _: &(), step: &Step) -> Result<Vec<String>, Infeasible> {
         let thing = &step.args[0];
-        let refuse = |reason: String| Err(Infeasible { reason, first: None });
+        let refuse = |reason: String| Err(Infeasible::because(reason));
         let present = scene.here.contains(thing) || scene.held.as_ref() == Some(thing);
         if step.operator == "GO" {
             if !present && !scene.far.remove(thing) {
@@ -148,7 +150,8 @@ impl Domain for Bench {
         }
         if scene.far.contains(thing) {
             let first = Some(format!("GO {thing}").parse().unwrap());
-            return Err(Infeasible { reason: format!("the {thing} is too far away"), first });
+            let reason = format!("the {thing} is too far away");
+            return Err(Infeasible { reason, first, first_on: Vec::new(), done: false });
         }
         if !present {
             return refuse(format!("there is no {thing}"));
@@ -187,7 +190,7 @@ impl Domain for Bench {
         None
     }
 
-    fn resolve(&self, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
+    fn resolve(&self, _: Edition, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
         let held = |kind: &&Symbol| scene.held.as_ref() == Some(*kind);
         let here = |kind: &&Symbol| scene.here.contains(*kind) || held(kind);
         let mut types: Vec<Symbol> = mention.types.iter().filter(here).cloned().collect();

@@ -1,14 +1,17 @@
-use super::arguments::Arguments;
+use super::accounting::Account;
+use super::arguments::{Arguments, Filling};
+use super::chosen::Chosen;
+use super::fill::{Filled, Missing, choices, fill, named_last};
 use super::moment::Moment;
 use super::purpose;
 use super::resolver::resolve;
+use super::run::Done;
 use super::settings::Execution;
 use crate::language::{
-    Answerer, Clause, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Step, Symbol,
-    Word, WordLists,
+    Answerer, Clause, LiftedProgram, LiftedUtterance, Program, Symbol, Word, WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
-use crate::world::Domain;
+use crate::world::{Domain, Edition, Pointing};
 
 /// A lifted program that the parser offers for a clause.
 #[derive(Debug, Clone)]
@@ -25,6 +28,17 @@ pub struct Offer<'a> {
     pub open: bool,
     /// Which part of the parser offers it, where it has parts.
     pub by: Option<Answerer>,
+    /// The words of the exemplar that it comes from, where they are known.
+    pub taught: Option<&'a LiftedUtterance>,
+    /// Words of clauses that it has nothing for, though it is of the whole utterance.
+    pub dropped: Vec<String>,
+}
+
+impl Offer<'_> {
+    /// Whether the words are those of the exemplar, and not only near enough to decide.
+    pub fn is_literal(&self) -> bool {
+        self.exact && !self.open
+    }
 }
 
 /// How clauses are put together.
@@ -32,8 +46,12 @@ pub struct Context<'a> {
     pub execution: &'a Execution,
     /// For choosing the arguments of open programs.
     pub lists: Option<&'a WordLists>,
+    /// What in the utterance asks for more, less or other than one step can say.
+    pub amounts: &'a [String],
     /// The distance of a chain from that of its first clauses and the next one's.
     pub chain: &'a dyn Fn(f32, f32) -> f32,
+    /// Of the domain's words.
+    pub edition: Edition,
 }
 
 /// A ground program for the whole utterance, and what the world says to it.
@@ -51,12 +69,16 @@ pub struct Candidate {
     pub answered_by: Vec<Answerer>,
     /// What was named last, for a later "it".
     pub mentioned: Option<Symbol>,
+    /// Whether the words of every clause were those of an exemplar.
+    pub literal: bool,
+    /// The words that it would pass over; it is then not taken.
+    pub left_over: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// It runs; per step the things it acts on.
-    Runs { bindings: Vec<Vec<String>> },
+    /// It runs; per step the things it acts on, and those of them that words chose.
+    Runs { bindings: Vec<Vec<String>>, chosen: Vec<Vec<Option<String>>> },
     /// The words make sense and the world forbids the 0-based `step`. `mendable`: another step
     /// first, such as going there, would allow it.
     Forbidden { step: u32, reason: String, mendable: bool },
@@ -83,10 +105,12 @@ pub fn combine<D: Domain>(
             distance: 0.0,
             seed: true,
             exact: true,
-            verdict: Verdict::Runs { bindings: Vec::new() },
+            verdict: Verdict::Runs { bindings: Vec::new(), chosen: Vec::new() },
             lifted: Vec::new(),
             answered_by: Vec::new(),
             mentioned: moment.mentioned.cloned(),
+            literal: true,
+            left_over: Vec::new(),
         },
     };
     let mut done = Vec::new();
@@ -97,11 +121,11 @@ pub fn combine<D: Domain>(
 }
 
 /// The first clauses of a combination, and the scene they lead to.
-struct Partial<S> {
-    scene: S,
+pub(super) struct Partial<S> {
+    pub scene: S,
     /// Whether every clause so far was read as one primitive.
-    literal: bool,
-    candidate: Candidate,
+    pub literal: bool,
+    pub candidate: Candidate,
 }
 
 fn extend<D: Domain>(
@@ -112,9 +136,9 @@ fn extend<D: Domain>(
 ) {
     let Some((next, rest)) = clauses.split_first() else {
         let mut whole = partial.candidate.clone();
-        let roles = &ground.moment.domain.lexicon().roles;
+        let roles = &ground.moment.domain.lexicon(ground.context.edition).roles;
         // Clauses that ask for nothing ("turn around") are no request by themselves.
-        if whole.program.steps.is_empty() {
+        if whole.program.steps.is_empty() && whole.left_over.is_empty() {
             return;
         }
         let steps = &whole.program.steps;
@@ -140,28 +164,44 @@ fn extend<D: Domain>(
         if done.len() >= COMBINATIONS_MAX {
             return;
         }
-        extend(ground, rest, &ground.advance(partial, offer), done);
+        extend(ground, rest, &ground.advance(partial, offer, rest.is_empty()), done);
     }
 }
 
-struct Ground<'a, D: Domain> {
-    moment: &'a Moment<'a, D>,
-    context: &'a Context<'a>,
+pub(super) struct Ground<'a, D: Domain> {
+    pub moment: &'a Moment<'a, D>,
+    pub context: &'a Context<'a>,
 }
 
 impl<D: Domain> Ground<'_, D> {
     /// Grounds one more clause. Once a step is forbidden nothing more is run, but the program is
     /// completed, so that the answer can show all of what was understood.
-    fn advance(&self, partial: &Partial<D::Scene>, offer: &Offer<'_>) -> Partial<D::Scene> {
+    ///
+    /// - `last`: whether no clause follows.
+    fn advance(
+        &self,
+        partial: &Partial<D::Scene>,
+        offer: &Offer<'_>,
+        last: bool,
+    ) -> Partial<D::Scene> {
         let domain = self.moment.domain;
+        let left = self.passed_over(offer);
+        if !left.is_empty() {
+            return self.leave(partial, offer, left);
+        }
         let before = partial.candidate.mentioned.as_ref();
-        let referents = resolve(domain, &partial.scene, &offer.clause.mentions, before);
+        let edition = self.context.edition;
+        let mut referents =
+            resolve(domain, edition, &partial.scene, &offer.clause.mentions, before);
+        self.prefer_what_is_there(&partial.scene, offer.clause, &mut referents.types);
         let held = domain.held(&partial.scene);
         let mentioned = referents.last.clone();
         // "Put the plate in it": what is in the hand goes in something else, whatever "it" means.
         let mentions = &offer.clause.mentions;
         let pronoun = offer.seed && mentions.len() > 1 && mentions.iter().any(|m| m.pronoun);
-        if let (true, Some(lists)) = (offer.open || pronoun, self.context.lists) {
+        let accounts = self.context.execution.accounting.is_some();
+        let chosen_by_world = offer.open || pronoun || (accounts && offer.seed);
+        if let (true, Some(lists)) = (chosen_by_world, self.context.lists) {
             let arguments = Arguments {
                 domain,
                 lists,
@@ -170,14 +210,40 @@ impl<D: Domain> Ground<'_, D> {
                 held: held.clone(),
                 here: domain.here(&partial.scene),
                 last: before,
+                recent: self.recent(partial),
+                absent: self.absent(partial, &referents.types),
+                parts: self.context.execution.accounting.as_ref().map(|a| &a.parts),
+                accounts,
+                edition: self.context.edition,
             };
-            return self.advance_open(partial, offer, &arguments, mentioned);
+            let carrying = self.context.execution.carrying.as_ref().filter(|_| offer.seed);
+            let operator = offer.program.steps.first().map(|step| &step.operator);
+            let carried = carrying.zip(operator).and_then(|(c, o)| arguments.carry(c, o, last));
+            let strictly = carried.is_some();
+            let filling = match offer.program.steps.is_empty() {
+                true => None,
+                false => carried.or_else(|| arguments.fill(&offer.program)),
+            };
+            // A seed's own words are answered, if only with what the world says against them.
+            if filling.is_some() || offer.open || pronoun {
+                return self.advance_open(partial, offer, &arguments, filling, strictly, mentioned);
+            }
         }
+        let mentions = &offer.clause.mentions;
+        let best: Vec<Option<Symbol>> =
+            referents.types.iter().map(|t| t.first().cloned()).collect();
+        let obvious = fill(&offer.program, mentions, &best, held.as_ref()).program;
+        let chosen = match self.choose(partial, offer, &referents.types, &obvious, false) {
+            Ok(chosen) => chosen,
+            Err(reason) => return self.nothing_like_it(partial, offer, obvious, reason),
+        };
         let mut first = None;
         for types in choices(&referents.types, &offer.program) {
-            let filled = fill(&offer.program, &offer.clause.mentions, &types, held.as_ref());
+            let mut filled = fill(&offer.program, &offer.clause.mentions, &types, held.as_ref());
+            filled.chosen = chosen.clone();
             let next = self.try_filled(partial, offer, filled, named_last(&types, before));
             match next.candidate.verdict {
+                _ if self.context.execution.kinds => return next,
                 Verdict::Runs { .. } => return next,
                 // "The counter" across the room does not come to mean the table beside the robot.
                 Verdict::Forbidden { mendable: true, .. } if first.is_none() => return next,
@@ -193,13 +259,21 @@ impl<D: Domain> Ground<'_, D> {
         partial: &Partial<D::Scene>,
         offer: &Offer<'_>,
         arguments: &Arguments<'_, D>,
+        filling: Option<Filling>,
+        strictly: bool,
         mentioned: Option<Symbol>,
     ) -> Partial<D::Scene> {
-        let program = |program| Filled { program, missing: None };
-        let filling = match offer.program.steps.is_empty() {
-            true => None,
-            false => arguments.fill(&offer.program),
-        };
+        let obvious = filling.as_ref().and_then(|filling| filling.programs.first());
+        let chosen =
+            match obvious.map(|o| self.choose(partial, offer, arguments.types, o, strictly)) {
+                None => Chosen::default(),
+                Some(Ok(chosen)) => chosen,
+                Some(Err(reason)) => {
+                    let obvious = obvious.expect("something was chosen for it").clone();
+                    return self.nothing_like_it(partial, offer, obvious, reason);
+                }
+            };
+        let program = |program| Filled { program, chosen: chosen.clone(), missing: None };
         let Some(filling) = filling else {
             let mut filled = program(Program { steps: Vec::new() });
             let steps = &partial.candidate.program.steps;
@@ -220,9 +294,16 @@ impl<D: Domain> Ground<'_, D> {
             filled.missing = Some(Missing::Slot { reason: format!("nothing of it is {word}") });
             return self.try_filled(partial, offer, filled, mentioned);
         }
+        if let (true, Some(first)) = (arguments.accounts, filling.programs.first()) {
+            let left = arguments.passed_over(first);
+            if !left.is_empty() {
+                return self.leave(partial, offer, left);
+            }
+        }
         let further = Offer { distance: further(offer.distance, filling.penalty), ..offer.clone() };
         let mut first = None;
-        for ground in filling.programs.into_iter().take(TYPE_CHOICES_MAX) {
+        let choices = if self.context.execution.kinds { 1 } else { TYPE_CHOICES_MAX };
+        for ground in filling.programs.into_iter().take(choices) {
             let named = ground.steps.last().and_then(|step| step.args.first()).cloned();
             let mentioned = named.or_else(|| mentioned.clone());
             let next = self.try_filled(partial, &further, program(ground), mentioned);
@@ -234,6 +315,95 @@ impl<D: Domain> Ground<'_, D> {
             first.get_or_insert(next);
         }
         first.expect("a filling has at least one program")
+    }
+
+    /// A reading whose words say of a thing what none here is: understood, and impossible.
+    fn nothing_like_it(
+        &self,
+        partial: &Partial<D::Scene>,
+        offer: &Offer<'_>,
+        program: Program,
+        reason: String,
+    ) -> Partial<D::Scene> {
+        let missing = Some(Missing::Meaning { step: 0, reason });
+        let filled = Filled { program, chosen: Chosen::default(), missing };
+        self.try_filled(partial, offer, filled, partial.candidate.mentioned.clone())
+    }
+
+    /// Per mention whether nothing of its likeliest type is in the scene.
+    fn absent(&self, partial: &Partial<D::Scene>, types: &[Vec<Symbol>]) -> Vec<bool> {
+        if self.context.execution.accounting.is_none() {
+            return Vec::new();
+        }
+        let first = Pointing { number: Some(1), ..Pointing::default() };
+        let absent = |kinds: &Vec<Symbol>| {
+            let kind = kinds.first();
+            kind.is_some_and(|k| self.moment.domain.choose(&partial.scene, k, &first).is_err())
+        };
+        types.iter().map(absent).collect()
+    }
+
+    /// The types of what was acted on, newest first.
+    fn recent(&self, partial: &Partial<D::Scene>) -> Vec<Symbol> {
+        let steps = partial.candidate.program.steps.iter().rev();
+        let here = steps.flat_map(|step| step.args.iter().cloned());
+        // `Mug 2` is a `Mug`.
+        let kind = |name: &String| Symbol::new(name.split(' ').next().unwrap_or_default());
+        here.chain(self.moment.handled.iter().map(kind)).collect()
+    }
+
+    /// The words that an offer passes over, before anything is filled.
+    fn passed_over(&self, offer: &Offer<'_>) -> Vec<String> {
+        let Some((accounting, lists)) =
+            self.context.execution.accounting.as_ref().zip(self.context.lists)
+        else {
+            return Vec::new();
+        };
+        let lesson = !offer.seed;
+        let taught = |phrase: &&String| {
+            let words = phrase.split(' ');
+            offer.taught.is_some_and(|taught| {
+                words.into_iter().all(|word| {
+                    taught.words.iter().any(|w| matches!(w, Word::Text(t) if t == word))
+                })
+            })
+        };
+        let literal = lesson && offer.is_literal();
+        let amounts = self.context.amounts.iter().filter(|phrase| !(literal && taught(phrase)));
+        let mut left: Vec<String> = amounts.cloned().collect();
+        left.extend(offer.dropped.iter().cloned());
+        if literal {
+            return left;
+        }
+        let lexicon = self.moment.domain.lexicon(self.context.edition);
+        let (adjectives, roles) = (lexicon.adjectives.as_slice(), &lexicon.roles);
+        let account = Account { lists, adjectives, roles, accounting, clause: offer.clause };
+        let more = match (lesson, offer.taught, offer.program.steps.as_slice()) {
+            (true, taught, _) => account.of_lesson(taught.unwrap_or(&LiftedUtterance::default())),
+            (false, _, [step]) => account.of_primitive(&step.operator),
+            (false, _, []) => account.of_idle(),
+            _ => Vec::new(),
+        };
+        left.extend(more.into_iter().filter(|word| !amounts_hold(self.context.amounts, word)));
+        left
+    }
+
+    /// A reading that would pass words over: none of it is done.
+    fn leave(
+        &self,
+        partial: &Partial<D::Scene>,
+        offer: &Offer<'_>,
+        left: Vec<String>,
+    ) -> Partial<D::Scene> {
+        let quoted: Vec<String> = left.iter().map(|word| format!("{word:?}")).collect();
+        let reason = format!("nothing that was understood is about {}", quoted.join(" and "));
+        let missing = Some(Missing::Slot { reason });
+        let program = Program { steps: Vec::new() };
+        let filled = Filled { program, chosen: Chosen::default(), missing };
+        let mentioned = partial.candidate.mentioned.clone();
+        let mut next = self.try_filled(partial, offer, filled, mentioned);
+        next.candidate.left_over.extend(left);
+        next
     }
 
     /// A word before a mention of something in the program that is true of nothing of its type.
@@ -270,24 +440,31 @@ impl<D: Domain> Ground<'_, D> {
         let so_far = &partial.candidate;
         let mut scene = partial.scene.clone();
         let mut steps = so_far.program.steps.clone();
-        let mut verdict = so_far.verdict.clone();
-        if let Verdict::Runs { bindings } = &mut verdict {
-            let failed = match filled.missing {
-                Some(Missing::Slot { reason }) => Some(Verdict::Unfilled { reason }),
-                Some(Missing::Meaning { step, reason }) => {
-                    let step = (steps.len() + step) as u32;
-                    Some(Verdict::Forbidden { step, reason, mendable: false })
-                }
-                None => self.run(&mut scene, &mut steps, bindings, offer, &filled.program).err(),
-            };
-            if let Some(failed) = failed {
-                verdict = failed;
-                // The scene stays as it was before the clause: none of it will be carried out.
-                scene = partial.scene.clone();
-                steps.truncate(so_far.program.steps.len());
-                steps.extend(filled.program.steps);
+        let verdict = match (so_far.verdict.clone(), filled.missing) {
+            (Verdict::Runs { .. }, Some(Missing::Slot { reason })) => Verdict::Unfilled { reason },
+            (Verdict::Runs { .. }, Some(Missing::Meaning { step, reason })) => {
+                let step = (steps.len() + step) as u32;
+                Verdict::Forbidden { step, reason, mendable: false }
             }
-        } else {
+            (Verdict::Runs { bindings, chosen }, None) => {
+                let mut done = Done { steps: steps.clone(), bindings, chosen };
+                let wished = &filled.chosen;
+                let after_lesson = !so_far.seed;
+                match self.run(&mut scene, &mut done, offer, after_lesson, &filled.program, wished)
+                {
+                    Ok(()) => {
+                        steps = done.steps;
+                        Verdict::Runs { bindings: done.bindings, chosen: done.chosen }
+                    }
+                    Err(failed) => failed,
+                }
+            }
+            (failed, _) => failed,
+        };
+        let mut verdict = verdict;
+        if !matches!(verdict, Verdict::Runs { .. }) {
+            // The scene stays as it was before the clause: none of it will be carried out.
+            scene = partial.scene.clone();
             steps.extend(filled.program.steps);
         }
         if steps.len() > PROGRAM_STEPS_MAX {
@@ -310,81 +487,16 @@ impl<D: Domain> Ground<'_, D> {
             lifted,
             answered_by,
             mentioned,
+            literal: so_far.literal && offer.is_literal(),
+            left_over: so_far.left_over.clone(),
         };
         let literal = partial.literal && offer.seed;
         Partial { scene, literal, candidate }
     }
+}
 
-    /// Carries the steps out on the copy of the scene.
-    ///
-    /// - errors: [`Verdict::Forbidden`], its step counted over the whole program.
-    fn run(
-        &self,
-        scene: &mut D::Scene,
-        steps: &mut Vec<Step>,
-        bindings: &mut Vec<Vec<String>>,
-        offer: &Offer<'_>,
-        program: &Program,
-    ) -> Result<(), Verdict> {
-        let (domain, task) = (self.moment.domain, self.moment.task);
-        let before = steps.len();
-        let contradicted = |scene: &D::Scene, from: usize| {
-            let rest = Program { steps: program.steps[from..].to_vec() };
-            if !self.context.execution.polarity {
-                return None;
-            }
-            let (step, reason) = domain.contradiction(scene, &offer.clause.words, &rest)?;
-            let step = (before + from + step) as u32;
-            Some(Verdict::Forbidden { step, reason, mendable: false })
-        };
-        if let Some(contradiction) = contradicted(scene, 0) {
-            return Err(contradiction);
-        }
-        for (index, step) in program.steps.iter().enumerate() {
-            let refused = |reason, mendable| Verdict::Forbidden {
-                step: (before + index) as u32,
-                reason,
-                mendable,
-            };
-            if steps.len() >= PROGRAM_STEPS_MAX {
-                return Err(refused("the program is too long".to_owned(), false));
-            }
-            domain.signature().check(step).map_err(|reason| refused(reason, false))?;
-            let mut unasked = 0;
-            let bound = loop {
-                let refusal = match domain.step(scene, task, step) {
-                    Ok(bound) => break Some(bound),
-                    Err(refusal) => refusal,
-                };
-                // What is in the fridge across the room takes two: going there and opening it.
-                let roles = &domain.lexicon().roles;
-                let means = roles.goes(&step.operator) || roles.is_door(&step.operator);
-                // How the lesson got there need not be how one gets there here.
-                if offer.open && program.steps.len() > 1 && means && refusal.first.is_none() {
-                    break None;
-                }
-                let mendable = refusal.first.is_some();
-                let first = refusal.first.filter(|_| self.context.execution.approach);
-                let Some(first) = first.filter(|_| unasked < UNASKED_STEPS_MAX) else {
-                    return Err(refused(refusal.reason, mendable));
-                };
-                let bound =
-                    domain.step(scene, task, &first).map_err(|e| refused(e.reason, false))?;
-                steps.push(first);
-                bindings.push(bound);
-                unasked += 1;
-                // What was too far away to contradict the words is near now.
-                if let Some(contradiction) = contradicted(scene, index) {
-                    return Err(contradiction);
-                }
-            };
-            if let Some(bound) = bound {
-                bindings.push(bound);
-                steps.push(step.clone());
-            }
-        }
-        Ok(())
-    }
+fn amounts_hold(amounts: &[String], word: &str) -> bool {
+    amounts.iter().any(|phrase| phrase.split(' ').any(|part| part == word))
 }
 
 /// The distance of a reading whose arguments are not the obvious ones: each point of penalty takes
@@ -393,109 +505,4 @@ fn further(distance: f32, penalty: f32) -> f32 {
     let factor = crate::numerics::exp(-0.5 * penalty);
     let kept = (1.0 - distance) * factor;
     distance / (distance + kept).max(f32::MIN_POSITIVE)
-}
-
-/// Steps taken unasked before one step that needs them.
-const UNASKED_STEPS_MAX: usize = 3;
-
-/// Which types the mentions are tried with: first the best of each; then, one mention at a time,
-/// the others that share its name ("cup" when only the mug can be picked up).
-fn choices(types: &[Vec<Symbol>], program: &LiftedProgram) -> Vec<Vec<Option<Symbol>>> {
-    let best: Vec<Option<Symbol>> = types.iter().map(|types| types.first().cloned()).collect();
-    let mut all = vec![best.clone()];
-    for (index, others) in types.iter().enumerate() {
-        let used = program.steps.iter().flat_map(|step| &step.args).any(
-            |arg| matches!(arg, LiftedArg::Slot { number, .. } if *number as usize == index + 1),
-        );
-        for other in others.iter().skip(1).filter(|_| used) {
-            if all.len() >= TYPE_CHOICES_MAX {
-                return all;
-            }
-            let mut choice = best.clone();
-            choice[index] = Some(other.clone());
-            all.push(choice);
-        }
-    }
-    all
-}
-
-fn named_last(types: &[Option<Symbol>], before: Option<&Symbol>) -> Option<Symbol> {
-    types.iter().rev().flatten().next().or(before).cloned()
-}
-
-/// A lifted program with its slots filled, as far as that went.
-struct Filled {
-    program: Program,
-    missing: Option<Missing>,
-}
-
-enum Missing {
-    /// The utterance has no such mention: the program is not what it asks for.
-    Slot { reason: String },
-    /// The mention is there, but nothing tells what it means.
-    Meaning { step: usize, reason: String },
-}
-
-/// What cannot be filled keeps the word that stood for it, so that the answer can show it.
-fn fill(
-    program: &LiftedProgram,
-    mentions: &[Mention],
-    types: &[Option<Symbol>],
-    held: Option<&Symbol>,
-) -> Filled {
-    let mut missing = None;
-    let mut steps = Vec::with_capacity(program.steps.len());
-    for (index, step) in program.steps.iter().enumerate() {
-        let mut fill_arg = |arg: &LiftedArg| {
-            let (lacking, stand_in) = match arg {
-                LiftedArg::Constant(symbol) => return symbol.clone(),
-                LiftedArg::Held => match held {
-                    Some(held) => return held.clone(),
-                    None => {
-                        let reason = "the robot holds nothing".to_owned();
-                        (Missing::Meaning { step: index, reason }, arg.to_string())
-                    }
-                },
-                LiftedArg::Slot { number, .. } => {
-                    let place = *number as usize - 1;
-                    match (mentions.get(place), types.get(place)) {
-                        (_, Some(Some(kind))) => return kind.clone(),
-                        (Some(mention), _) => {
-                            (unexplained(index, mention), mention.surface.clone())
-                        }
-                        (None, _) => {
-                            let reason = format!(
-                                "it takes {} named things, and {} were named",
-                                program.slots(),
-                                mentions.len()
-                            );
-                            (Missing::Slot { reason }, arg.to_string())
-                        }
-                    }
-                }
-            };
-            // A missing slot outweighs a missing meaning: it says the program is another one.
-            let replace = matches!(
-                (&missing, &lacking),
-                (None, _) | (Some(Missing::Meaning { .. }), Missing::Slot { .. })
-            );
-            if replace {
-                missing = Some(lacking);
-            }
-            Symbol::new(&stand_in)
-        };
-        let args = step.args.iter().map(&mut fill_arg).collect();
-        steps.push(Step { operator: step.operator.clone(), args });
-    }
-    Filled { program: Program { steps }, missing }
-}
-
-fn unexplained(step: usize, mention: &Mention) -> Missing {
-    let word = &mention.surface;
-    let reason = if mention.pronoun {
-        format!("nothing was named before that {word:?} could mean, and the robot holds nothing")
-    } else {
-        format!("there is no {word} here")
-    };
-    Missing::Meaning { step, reason }
 }

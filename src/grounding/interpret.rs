@@ -1,15 +1,16 @@
-use super::abstractor::{Abstractor, without_locations};
+use super::abstractor::{Abstracted, Abstractor, without_locations};
 use super::combine::{Candidate, Context, Offer, Verdict, combine};
 use super::moment::Moment;
 use super::reranker::Reranker;
 use super::resolver::resolve;
 use super::settings::{Abstraction, Execution};
 use crate::language::{
-    Answer, Clause, Discarded, Evidence, Grammar, LiftedUtterance, Near, Outcome, Symbol, Utterance,
+    Accounted, Answer, Clause, Discarded, Evidence, Grammar, LiftedArg, LiftedProgram, LiftedStep,
+    LiftedUtterance, Mention, Near, Outcome, Roles, Symbol, Use, Utterance, Word, WordLists,
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
-use crate::parser::{Parse, SemanticParser};
-use crate::world::Domain;
+use crate::parser::{Parse, Scored, SemanticParser};
+use crate::world::{Domain, Edition};
 
 /// All that an interpretation needs beside the moment and the words: the parts of a mind.
 pub struct Interpreter<'a, P> {
@@ -22,6 +23,8 @@ pub struct Interpreter<'a, P> {
     pub reranker: Option<&'a Reranker>,
     /// How many of the parser's exemplars, from the first, are seeds.
     pub seeds: u32,
+    /// Of the domain's words.
+    pub edition: Edition,
 }
 
 impl<P: SemanticParser> Interpreter<'_, P> {
@@ -32,16 +35,23 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     /// a reranker the nearest feasible candidate wins. Nothing is carried out here.
     pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
+        if heard.abstracted.mood.is_some() {
+            return heard.not_asked(moment);
+        }
         let mut candidates = Vec::new();
         for ways in heard.deciding() {
-            let found = self.ground(moment, &ways, heard.threshold());
+            let found = self.ground(moment, &heard, &ways);
             let runs = !feasible(&found).is_empty();
+            let decided = self.accounts() && found.iter().any(is_final);
             if runs || candidates.is_empty() {
                 candidates = found;
             }
-            if runs {
+            if runs || decided {
                 break;
             }
+        }
+        if self.accounts() {
+            keep_before_the_final(&mut candidates);
         }
         let feasible = feasible(&candidates);
         let exact = heard.exact();
@@ -59,7 +69,10 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         };
         // Candidates are sorted: the first forbidden one is the best guess at what was meant.
         let is_forbidden = |c: &&Candidate| matches!(c.verdict, Verdict::Forbidden { .. });
-        let told = chosen.or_else(|| candidates.iter().find(is_forbidden));
+        // A reading that passes words over says that they were not understood, not that the world
+        // forbids something else.
+        let left = candidates.first().is_some_and(|first| !first.left_over.is_empty());
+        let told = chosen.or_else(|| candidates.iter().find(is_forbidden).filter(|_| !left));
         let outcome = told.map_or(Outcome::NotSure, outcome_of);
         let mentioned = match told {
             Some(candidate) => candidate.mentioned.clone(),
@@ -74,7 +87,11 @@ impl<P: SemanticParser> Interpreter<'_, P> {
             _ => Vec::new(),
         };
         evidence.discarded = discarded(&candidates, told);
-        Answer { outcome, evidence, mentioned }
+        let chosen = told.map(chosen_of).unwrap_or_default();
+        if self.accounts() {
+            evidence.accounting = heard.account(told.or(candidates.first()));
+        }
+        Answer { outcome, evidence, mentioned, chosen }
     }
 
     /// Every candidate that runs, nearest first, exact or not: what the reranker learns to choose
@@ -85,8 +102,12 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         utterance: &Utterance,
     ) -> Vec<Candidate> {
         let heard = self.hear(moment, utterance, Ways::All);
-        let all = self.ground(moment, &heard.all(), heard.threshold());
+        let all = self.ground(moment, &heard, &heard.all());
         feasible(&all).into_iter().cloned().collect()
+    }
+
+    fn accounts(&self) -> bool {
+        self.execution.accounting.is_some()
     }
 
     /// How many of the feasible candidates, from the first, the reranker chooses from.
@@ -99,42 +120,80 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         }
     }
 
-    fn hear<D: Domain>(&self, moment: &Moment<'_, D>, said: &Utterance, ways: Ways) -> Heard {
-        let lexicon = moment.domain.lexicon();
+    fn hear<D: Domain>(&self, moment: &Moment<'_, D>, said: &Utterance, ways: Ways) -> Heard<'_> {
+        let lexicon = moment.domain.lexicon(self.edition);
         let abstracted = Abstractor::new(lexicon, self.abstraction, self.known).read(said);
         let grammar = self.abstraction.lists.as_ref();
         let grammar = grammar.map(|lists| Grammar { lists, adjectives: &lexicon.adjectives });
-        let whole = self.listen(abstracted.whole());
+        let listen = |clause| self.listen(clause, grammar.as_ref(), &lexicon.roles);
+        let whole = listen(abstracted.whole());
         let parts = match abstracted.clauses(self.abstraction.split, grammar) {
             // An exact match of the whole needs no second opinion from its parts.
             Some(parts) if !whole.literal() || ways == Ways::All => parts,
             _ => Vec::new(),
         };
-        let parts = parts.into_iter().map(|part| self.listen(part)).collect();
-        Heard { whole, parts, seeds: self.seeds }
+        let parts = parts.into_iter().map(listen).collect();
+        let lists = self.abstraction.lists.as_ref();
+        Heard { abstracted, lists, whole, parts, seeds: self.seeds, edition: self.edition }
     }
 
     /// Parses a clause in each of its readings.
-    fn listen(&self, clause: Clause) -> ParsedClause {
+    fn listen(&self, clause: Clause, grammar: Option<&Grammar<'_>>, roles: &Roles) -> ParsedClause {
         let without = self.abstraction.locations.then(|| without_locations(&clause)).flatten();
         let readings = [Some(clause), without].into_iter().flatten();
         let parse = |clause: Clause| {
-            let parse = self.parser.parse(&clause);
+            let mut parse = self.parser.parse(&clause);
+            if let Some(walk) = grammar.and_then(|grammar| self.carries(&clause, grammar, roles))
+                && parse.candidates.iter().all(|scored| scored.number >= self.seeds)
+            {
+                parse.candidates.push(walk);
+            }
             (clause, parse)
         };
         ParsedClause { readings: readings.map(parse).collect() }
+    }
+
+    /// A verb that takes a thing along is a way to where it goes, however rarely people use it; the
+    /// things decide what else it is.
+    fn carries(&self, clause: &Clause, grammar: &Grammar<'_>, roles: &Roles) -> Option<Scored> {
+        let carrying = self.execution.carrying.as_ref()?;
+        let verb = grammar.main_verb(&clause.lifted.words)?.word;
+        let known = carrying.leaving.contains(&verb) || carrying.keeping.contains(&verb);
+        let (going, sort) = (roles.going.as_ref()?, clause.mentions.first()?.sort.clone());
+        let step =
+            LiftedStep { operator: going.clone(), args: vec![LiftedArg::Slot { sort, number: 1 }] };
+        let program = LiftedProgram { steps: vec![step] };
+        let scored = Scored { program, distance: CARRIED_AT, number: 0, open: true, by: None };
+        let alone = known && clause.mentions.len() > 1 && grammar.cut(clause).len() == 1;
+        alone.then_some(scored)
     }
 
     /// Grounds each way of reading the utterance; equal programs are kept once, nearest first.
     fn ground<D: Domain>(
         &self,
         moment: &Moment<'_, D>,
+        heard: &Heard<'_>,
         ways: &[Vec<Vec<Offer<'_>>>],
-        threshold: f32,
     ) -> Vec<Candidate> {
         let lists = self.abstraction.lists.as_ref();
         let chain = |so_far, next| self.parser.chain(so_far, next);
-        let context = Context { execution: self.execution, lists, chain: &chain };
+        let grammar = lists.map(|lists| Grammar {
+            lists,
+            adjectives: &moment.domain.lexicon(self.edition).adjectives,
+        });
+        let mut marked = Vec::new();
+        let ways = match grammar.filter(|_| self.accounts()) {
+            Some(grammar) => {
+                marked.extend_from_slice(ways);
+                heard.mark_dropped(&mut marked, &grammar);
+                &marked
+            }
+            None => ways,
+        };
+        let amounts = heard.abstracted.amounts.as_slice();
+        let (execution, edition) = (self.execution, self.edition);
+        let context = Context { execution, lists, amounts, chain: &chain, edition };
+        let threshold = heard.threshold();
         let mut all: Vec<Candidate> =
             ways.iter().flat_map(|clauses| combine(moment, &context, clauses)).collect();
         // Stable: at equal distance the whole utterance comes before its parts, and within each
@@ -189,6 +248,8 @@ impl ParsedClause {
                 open: scored.open,
                 by: scored.by,
                 seed: scored.number < seeds,
+                taught: taught(parse, scored.number),
+                dropped: Vec::new(),
             }));
         }
         offers.sort_by(|a, b| a.distance.total_cmp(&b.distance));
@@ -214,14 +275,17 @@ impl ParsedClause {
 }
 
 /// The utterance, whole and cut, parsed.
-struct Heard {
+struct Heard<'a> {
+    abstracted: Abstracted,
+    lists: Option<&'a WordLists>,
     whole: ParsedClause,
     /// Empty when there is nothing to cut.
     parts: Vec<ParsedClause>,
     seeds: u32,
+    edition: Edition,
 }
 
-impl Heard {
+impl Heard<'_> {
     /// Whether the words are exactly those of exemplars: as a whole, or part by part.
     fn exact(&self) -> bool {
         self.whole.exact() || self.parts_exact()
@@ -259,9 +323,118 @@ impl Heard {
         vec![vec![self.whole.offers(self.seeds)], parts]
     }
 
+    /// Notes in every reading of several clauses as one lesson the verbs that it has nothing for.
+    ///
+    /// A lesson of as many clauses has something for each. Else each verb must be the lesson's or
+    /// another word for it, or what its clause means by itself must be among the lesson's steps.
+    fn mark_dropped(&self, ways: &mut [Vec<Vec<Offer<'_>>>], grammar: &Grammar<'_>) {
+        let whole = ways.iter_mut().filter(|way| way.len() == 1 && self.parts.len() > 1);
+        for offer in whole.flatten().flatten().filter(|offer| !offer.seed && !offer.is_literal()) {
+            let Some(taught) = offer.taught else { continue };
+            let lesson = Clause::of(taught);
+            // A lesson has lost its marks: its verbs tell its clauses.
+            let is_verb =
+                |word: &&Word| matches!(word, Word::Text(t) if grammar.lists.verbs.contains(t));
+            let verbs = taught.words.iter().filter(is_verb).count();
+            let clauses = grammar.cut(&lesson).len().max(verbs);
+            if clauses >= self.parts.len() {
+                continue;
+            }
+            let in_lesson =
+                |verb: &str| taught.words.iter().any(|w| matches!(w, Word::Text(t) if t == verb));
+            // As many clauses as the lesson has may say the same in other words.
+            let mut other_words = clauses;
+            let mut unexplained = Vec::new();
+            for part in &self.parts {
+                let Some(verb) = grammar.main_verb(&part.lifted().words) else { continue };
+                let own = part.offers(self.seeds);
+                let own = own.first().filter(|own| own.seed);
+                let step = own.and_then(|own| own.program.steps.first());
+                let among = step.is_some_and(|step| {
+                    offer.program.steps.iter().any(|other| other.operator == step.operator)
+                });
+                match (in_lesson(&verb.word), among) {
+                    (true, _) => other_words = other_words.saturating_sub(1),
+                    (false, true) => {}
+                    (false, false) => unexplained.push(verb.word),
+                }
+            }
+            if unexplained.len() > other_words {
+                offer.dropped.extend(unexplained);
+            }
+        }
+    }
+
+    /// The answer to what asks for nothing: it names the words that say so.
+    fn not_asked<D: Domain>(&self, moment: &Moment<'_, D>) -> Answer {
+        let mood = self.abstracted.mood.clone();
+        let evidence = Evidence {
+            lifted: vec![self.whole.lifted().clone()],
+            threshold: self.threshold(),
+            mood,
+            ..Evidence::default()
+        };
+        let mentioned = self.named_last(moment);
+        Answer { outcome: Outcome::NotSure, evidence, mentioned, chosen: Vec::new() }
+    }
+
+    /// What each word of the utterance was used for by a reading; of a reading that is not taken,
+    /// which words it leaves over.
+    fn account(&self, reading: Option<&Candidate>) -> Vec<Accounted> {
+        let frames = self.abstracted.frames.iter();
+        let mut all: Vec<Accounted> =
+            frames.map(|phrase| Accounted { word: phrase.clone(), used: Use::Frame }).collect();
+        let Some(reading) = reading else { return all };
+        let clause = &self.whole.readings[0].0;
+        let left = |word: &str| {
+            let held = |phrase: &String| phrase == word || phrase.split(' ').any(|w| w == word);
+            reading.left_over.iter().any(held)
+        };
+        let acts = |mention: &Mention| {
+            let kinds = &mention.types;
+            reading.program.steps.iter().any(|s| s.args.iter().any(|arg| kinds.contains(arg)))
+        };
+        let mut mentions = clause.mentions.iter().zip(&clause.attributes);
+        for word in &clause.lifted.words {
+            match word {
+                Word::Text(text) => {
+                    let used = if left(text) { Use::Nothing } else { self.plain_use(text) };
+                    all.push(Accounted { word: text.clone(), used });
+                }
+                Word::Slot { .. } => {
+                    let Some((mention, attributes)) = mentions.next() else { continue };
+                    let attribute =
+                        |word: &String| Accounted { word: word.clone(), used: Use::Attribute };
+                    all.extend(attributes.iter().map(attribute));
+                    let used = match () {
+                        () if left(&mention.surface) => Use::Nothing,
+                        () if mention.pronoun || acts(mention) => Use::Thing,
+                        () => Use::Landmark,
+                    };
+                    all.push(Accounted { word: mention.surface.clone(), used });
+                }
+            }
+        }
+        all
+    }
+
+    /// Of a word that names nothing: whether it says what to do.
+    fn plain_use(&self, text: &str) -> Use {
+        match self.lists.as_ref() {
+            Some(lists) if lists.verbs.contains(text) || lists.noun_verbs.contains(text) => {
+                Use::Verb
+            }
+            Some(lists) if lists.verb_particles.contains(text) => Use::Verb,
+            Some(lists) if lists.stop.contains(text) || lists.determiners.contains(text) => {
+                Use::Harmless
+            }
+            _ => Use::Verb,
+        }
+    }
+
     fn named_last<D: Domain>(&self, moment: &Moment<'_, D>) -> Option<Symbol> {
         let mentions = &self.whole.readings[0].0.mentions;
-        resolve(moment.domain, moment.scene, mentions, moment.mentioned).last
+        resolve(moment.domain, self.edition, moment.scene, mentions, moment.mentioned).last
     }
 
     /// The part of the evidence that comes from parsing. An utterance that was understood in parts
@@ -303,14 +476,55 @@ impl Heard {
     }
 }
 
+fn taught(parse: &Parse, number: u32) -> Option<&LiftedUtterance> {
+    parse.nearest.iter().find(|near| near.number == number).map(|near| &near.exemplar)
+}
+
+/// The distance of a way that a verb of carrying gives: not as said, and sure.
+const CARRIED_AT: f32 = 0.1;
+/// How far a reading is that is as good as said.
+const SAID_WITHIN: f32 = 0.02;
+
+/// Whether a reading is what was said, and cannot be done: no other reading is then taken in its
+/// place. That is one whose words are an exemplar's or all but, and that the world forbids.
+fn is_final(candidate: &Candidate) -> bool {
+    let said = candidate.literal || (candidate.seed && candidate.distance <= SAID_WITHIN);
+    said && matches!(candidate.verdict, Verdict::Forbidden { .. })
+}
+
+/// Drops what comes behind a reading that decides, or behind one that passes words over: what is
+/// farther away is not what was said.
+fn keep_before_the_final(candidates: &mut Vec<Candidate>) {
+    let decides = |c: &Candidate| is_final(c) || (c.seed && !c.left_over.is_empty());
+    if let Some(at) = candidates.iter().position(decides) {
+        let literal =
+            candidates.iter().any(|c| c.literal && matches!(c.verdict, Verdict::Runs { .. }));
+        if !literal {
+            candidates.truncate(at + 1);
+        }
+    }
+}
+
 fn feasible(candidates: &[Candidate]) -> Vec<&Candidate> {
     candidates.iter().filter(|c| matches!(c.verdict, Verdict::Runs { .. })).collect()
+}
+
+/// Per step the things that words chose; empty when they chose none.
+fn chosen_of(candidate: &Candidate) -> Vec<Vec<Option<String>>> {
+    match &candidate.verdict {
+        Verdict::Runs { chosen, .. } if chosen.iter().any(|step| !step.is_empty()) => {
+            chosen.clone()
+        }
+        _ => Vec::new(),
+    }
 }
 
 fn outcome_of(candidate: &Candidate) -> Outcome {
     let program = candidate.program.clone();
     match &candidate.verdict {
-        Verdict::Runs { bindings } => Outcome::Understood { program, bindings: bindings.clone() },
+        Verdict::Runs { bindings, .. } => {
+            Outcome::Understood { program, bindings: bindings.clone() }
+        }
         Verdict::Forbidden { step, reason, .. } => {
             Outcome::Impossible { program, step: *step, reason: reason.clone() }
         }
@@ -322,6 +536,8 @@ fn discarded(candidates: &[Candidate], told: Option<&Candidate>) -> Vec<Discarde
     let dropped = candidates.iter().filter_map(|candidate| match &candidate.verdict {
         _ if told.is_some_and(|told| told.program == candidate.program) => None,
         Verdict::Runs { .. } => None,
+        // Nothing was made of it: its words are in the accounting.
+        _ if candidate.program.steps.is_empty() => None,
         Verdict::Forbidden { reason, .. } | Verdict::Unfilled { reason } => {
             Some(Discarded { program: candidate.program.clone(), reason: reason.clone() })
         }

@@ -4,17 +4,24 @@
 //! rerank.
 
 mod abstractor;
+mod accounting;
 mod arguments;
 #[cfg(test)]
 pub(crate) mod bench;
+mod chosen;
 mod combine;
+mod fill;
+mod frames;
 mod interpret;
 mod moment;
+mod mood;
 mod names;
+mod pointing;
 mod purpose;
 mod rerank_training;
 mod reranker;
 mod resolver;
+mod run;
 mod settings;
 #[cfg(test)]
 mod tests;

@@ -9,4 +9,7 @@ pub struct Moment<'a, D: Domain> {
     pub task: &'a D::Task,
     /// The type named last: what "it" means while the hand is empty.
     pub mentioned: Option<&'a Symbol>,
+    /// The things that were acted on before in the episode, by name, newest first: what "the other
+    /// one" leaves out and "the same one" means. A name may come again.
+    pub handled: &'a [String],
 }

@@ -130,7 +130,7 @@ fn singulars(word: &str) -> impl Iterator<Item = String> {
 
 /// Whether two different words become equal by one insertion, deletion, change or swap of
 /// neighbours.
-fn one_slip_apart(a: &str, b: &str) -> bool {
+pub(super) fn one_slip_apart(a: &str, b: &str) -> bool {
     if a.len().abs_diff(b.len()) > 4 {
         return false;
     }

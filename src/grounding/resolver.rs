@@ -1,5 +1,5 @@
 use crate::language::{Mention, Symbol};
-use crate::world::Domain;
+use crate::world::{Domain, Edition};
 
 /// What the mentions of a clause may mean.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -13,9 +13,11 @@ pub struct Referents {
 /// Entity resolution by scene (paper, section 3.1.1; DESIGN, decision 8): a name means the type
 /// with the closest instance, a pronoun what the robot holds, else what was named last.
 ///
+/// - `edition`: of the words that the mentions were found with.
 /// - `before`: what was named last before this clause.
 pub fn resolve<D: Domain>(
     domain: &D,
+    edition: Edition,
     scene: &D::Scene,
     mentions: &[Mention],
     before: Option<&Symbol>,
@@ -26,7 +28,7 @@ pub fn resolve<D: Domain>(
         let types = if mention.pronoun {
             held.clone().or_else(|| referents.last.clone()).into_iter().collect()
         } else {
-            domain.resolve(scene, mention)
+            domain.resolve(edition, scene, mention)
         };
         if let Some(best) = types.first() {
             referents.last = Some(best.clone());

@@ -1,9 +1,13 @@
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
+use super::frames::{Frames, Verbs};
+use super::mood::Moods;
 use crate::language::WordLists;
 
 /// How an utterance becomes lifted clauses. Everything is off in the recipe `paper`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Abstraction {
     /// Swallow the lexicon's adjectives before a name: "the red mug" lifts as "the mug" does.
@@ -21,13 +25,29 @@ pub struct Abstraction {
     /// as a verb where an object follows, and "a slice of the apple" as the apple.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lists: Option<WordLists>,
+    /// What people put around a request, taken away before anything is read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<Frames>,
+    /// Words by which a question, a statement or a prohibition is known; none is carried out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moods: Option<Moods>,
+    /// Other words for what the seeds say.
+    #[serde(default, skip_serializing_if = "Verbs::is_empty")]
+    pub verbs: Verbs,
+    /// Read a letter and its accent as one, however they were typed (Unicode NFC).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub composed: bool,
+    /// A number behind a name says which: "mug 2".
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub numbers: bool,
 }
 
 /// Where an utterance may be cut into clauses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Split {
     /// At "and" (paper, section 3.1.1).
+    #[default]
     And,
     /// Also at "then", comma, full stop and semicolon: a quarter of the recorded compound
     /// sentences have no "and".
@@ -37,7 +57,7 @@ pub enum Split {
 }
 
 /// How programs meet the scene. Everything is off in the recipe `paper`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Execution {
     /// "turn off" what is off is impossible, with that reason.
@@ -49,4 +69,43 @@ pub struct Execution {
     /// that nobody named: put something somewhere and then turn something on.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub purposes: bool,
+    /// Every word of a reading is accounted for, or nothing is done.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accounting: Option<Accounting>,
+    /// Taking something somewhere is never a walk without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carrying: Option<Carrying>,
+    /// Another kind of thing that shares the name is never taken for one that is here and cannot be
+    /// used.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub kinds: bool,
+    /// Steps of a lesson whose effect holds already are passed over.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub effects: bool,
+    /// Words choose between things of one kind.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub instances: bool,
+}
+
+/// What may be passed over when words are accounted for. Data of a recipe.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Accounting {
+    /// Nouns that name no thing of their own: "the DOOR of the fridge", "the other SIDE".
+    pub harmless: BTreeSet<String>,
+    /// The same where something is put or is, and not where the thing itself stands: "on the LID of
+    /// the toilet", "on the top SHELF" of a fridge that was just opened.
+    pub parts: BTreeSet<String>,
+    /// Words that ask more of a thing than to be switched: "turn the lamp UP", "RED".
+    pub degrees: BTreeSet<String>,
+}
+
+/// Verbs that take a thing along.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Carrying {
+    /// They leave it there: "bring".
+    pub leaving: BTreeSet<String>,
+    /// They may end with it in the hand: "carry".
+    pub keeping: BTreeSet<String>,
 }

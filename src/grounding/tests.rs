@@ -1,7 +1,7 @@
 use super::bench::{Bench, Overlap, Scene, exemplars, say};
 use super::*;
 use crate::language::{Answer, Outcome, Symbol};
-use crate::world::Domain;
+use crate::world::{Domain, Edition};
 
 /// As in the recipe `paper`.
 fn plain() -> (Abstraction, Execution) {
@@ -13,8 +13,9 @@ fn plain() -> (Abstraction, Execution) {
         spelling: false,
         split: Split::And,
         lists: None,
+        ..Abstraction::default()
     };
-    (abstraction, Execution { polarity: false, approach: false, purposes: false })
+    (abstraction, Execution::default())
 }
 
 /// As in the recipe `default`, and fixtures.
@@ -27,8 +28,9 @@ fn rich() -> (Abstraction, Execution) {
         spelling: true,
         split: Split::Clauses,
         lists: None,
+        ..Abstraction::default()
     };
-    (abstraction, Execution { polarity: true, approach: true, purposes: false })
+    (abstraction, Execution { polarity: true, approach: true, ..Execution::default() })
 }
 
 fn known(word: &str) -> bool {
@@ -37,7 +39,9 @@ fn known(word: &str) -> bool {
 
 fn lifted(settings: &(Abstraction, Execution), text: &str) -> String {
     let bench = Bench::new();
-    let whole = Abstractor::new(bench.lexicon(), &settings.0, &known).read(&say(text)).whole();
+    let whole = Abstractor::new(bench.lexicon(Edition::First), &settings.0, &known)
+        .read(&say(text))
+        .whole();
     whole.lifted.to_string()
 }
 
@@ -67,9 +71,11 @@ impl Talk {
             known: &known,
             reranker: None,
             seeds,
+            edition: Edition::First,
         };
         let mentioned = self.mentioned.as_ref();
-        let moment = Moment { domain: &bench, scene: &self.scene, task: &(), mentioned };
+        let moment =
+            Moment { domain: &bench, scene: &self.scene, task: &(), mentioned, handled: &[] };
         interpreter.interpret(&moment, &say(text))
     }
 
@@ -119,7 +125,7 @@ fn the_options_of_abstraction_do_what_they_say() {
 fn swallowed_words_are_kept_beside_their_slot() {
     let bench = Bench::new();
     let settings = rich().0;
-    let clause = Abstractor::new(bench.lexicon(), &settings, &known)
+    let clause = Abstractor::new(bench.lexicon(Edition::First), &settings, &known)
         .read(&say("put the small wooden box in the red tool box"))
         .whole();
     assert_eq!(clause.attributes, [vec!["small", "wooden"], vec!["red"]]);
@@ -132,7 +138,9 @@ fn swallowed_words_are_kept_beside_their_slot() {
 fn a_place_that_is_no_argument_can_be_left_out() {
     let bench = Bench::new();
     let settings = rich().0;
-    let read = |text| Abstractor::new(bench.lexicon(), &settings, &known).read(&say(text)).whole();
+    let read = |text| {
+        Abstractor::new(bench.lexicon(Edition::First), &settings, &known).read(&say(text)).whole()
+    };
     let clause = without_locations(&read("take the box from the table to the lamp")).unwrap();
     assert_eq!(clause.lifted.to_string(), "take the <thing> to the <thing=lamp>");
     assert_eq!(clause.mentions[1].surface, "lamp");
@@ -294,7 +302,7 @@ fn a_reranker_learns_which_program_fits_the_scene() {
     let near = Scene::with("Box Table");
     let far = Scene::with("*Box Table");
     let choice = |scene: &Scene, right: usize| {
-        let moment = Moment { domain: &bench, scene, task: &(), mentioned: None };
+        let moment = Moment { domain: &bench, scene, task: &(), mentioned: None, handled: &[] };
         let programs = ["TAKE Box", "GO Box; TAKE Box"].map(|text| text.parse().unwrap());
         let candidates = programs.iter().map(|program| featured(&moment, program)).collect();
         Choice { words: vec!["grab".to_owned(), "box".to_owned()], candidates, right }

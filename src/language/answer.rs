@@ -12,9 +12,24 @@ pub struct Answer {
     pub evidence: Evidence,
     /// The type that the last mention meant: what a later "it" means while the hand is empty.
     pub mentioned: Option<Symbol>,
+    /// Per step and argument the thing that words chose ("mug 2", "the other one"). Empty when they
+    /// chose none; where it is, the world chooses, now and whenever the record is read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub chosen: Vec<Vec<Option<String>>>,
 }
 
 impl Answer {
+    /// The things that words chose for a step, by its 0-based place.
+    pub fn chosen_for(&self, step: usize) -> &[Option<String>] {
+        self.chosen.get(step).map_or(&[], Vec::as_slice)
+    }
+
+    /// Whether somebody asked for something to be done now. What is asked, told or forbidden is not
+    /// there to be taught.
+    pub fn asks(&self) -> bool {
+        self.evidence.mood.is_none()
+    }
+
     /// Whether a part that answers whatever is said gave the program, or some of it, for words that
     /// it was never taught.
     pub fn guessed(&self) -> bool {
@@ -53,6 +68,74 @@ pub struct Evidence {
     /// there is no program, and for parsers that have one part only.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub answered_by: Vec<Answerer>,
+    /// Why the utterance is no request, where it is none and the recipe tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mood: Option<Mood>,
+    /// What each word was used for, in the order of the words; of the answer that was told, or of
+    /// the nearest one that left words over. Empty where the recipe does not account for words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub accounting: Vec<Accounted>,
+}
+
+impl Evidence {
+    /// The words that the answer would have passed over: why it is *not sure*.
+    pub fn left_over(&self) -> impl Iterator<Item = &str> {
+        let unused = self.accounting.iter().filter(|word| word.used == Use::Nothing);
+        unused.map(|word| word.word.as_str())
+    }
+}
+
+/// Why an utterance is no request for something to be done now. Each names the words that say so.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mood {
+    Asked {
+        word: String,
+    },
+    Told {
+        word: String,
+    },
+    Forbidden {
+        word: String,
+    },
+    Conditional {
+        word: String,
+    },
+    Later {
+        word: String,
+    },
+    /// What comes first in it is to be done last.
+    Reordered {
+        word: String,
+    },
+}
+
+/// A word or phrase of an utterance, and what it was used for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Accounted {
+    pub word: String,
+    #[serde(rename = "as")]
+    pub used: Use,
+}
+
+/// What a word was used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Use {
+    /// Address, courtesy, filler.
+    Frame,
+    /// The verb with its particle, or a word that a lesson has too.
+    Verb,
+    /// A thing, by its name or a pronoun, that the program acts on.
+    Thing,
+    /// Which of several things.
+    Attribute,
+    /// Where the thing is, or what it is near; it chose nothing that the program acts on.
+    Landmark,
+    /// Order, articles, prepositions and other words that ask for nothing.
+    Harmless,
+    /// Nothing: the reading passes it over, so it is not taken.
+    Nothing,
 }
 
 /// A part of a parser that answers by itself: in the paper's baseline a grammar answers first, else
@@ -101,7 +184,7 @@ mod tests {
             let answered_by = answered_by.to_vec();
             let lifted = clauses.to_vec();
             let evidence = Evidence { lifted, nearest, answered_by, ..Evidence::default() };
-            Answer { outcome: Outcome::NotSure, evidence, mentioned: None }
+            Answer { outcome: Outcome::NotSure, evidence, mentioned: None, chosen: Vec::new() }
         };
         let (grammar, model) = (Answerer::Grammar, Answerer::Seq2seq);
         let taught = Near {

@@ -60,6 +60,9 @@ pub struct WordLists {
         skip_serializing_if = "release_0_1::is_carrying_on"
     )]
     pub carrying_on: BTreeSet<String>,
+    /// The verbs that a misspelt first word may be.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub common_verbs: BTreeSet<String>,
 }
 
 /// Lists that release 0.1 had in its code. A recipe that was recorded by it has none of them, and

@@ -12,7 +12,7 @@ mod signature;
 mod symbol;
 mod utterance;
 
-pub use answer::{Answer, Answerer, Discarded, Evidence, Near, Outcome};
+pub use answer::{Accounted, Answer, Answerer, Discarded, Evidence, Mood, Near, Outcome, Use};
 pub use clause::Clause;
 pub use document::Document;
 pub use grammar::{Grammar, Verb};

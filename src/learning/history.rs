@@ -6,7 +6,7 @@ use crate::ids::Digest;
 use crate::language::{Clause, Exemplar, Program, Symbol, Word};
 use crate::numerics::Rng;
 use crate::parser::SemanticParser;
-use crate::world::Domain;
+use crate::world::{Domain, Edition};
 
 /// The history that the reranker learns from: each lesson parsed again by the new parser at its
 /// own moment, and each seed with things of a lesson's scene in its slots, so that a few lessons do
@@ -21,7 +21,7 @@ pub(super) fn history<D: Domain>(
 ) -> Vec<Choice> {
     let taught = lessons.iter().map(|lesson| taught(domain, mind, lesson));
     let mut rng = Rng::from_digest(seed);
-    let names = names(domain);
+    let names = names(domain, mind.recipe.settings().words.edition);
     // Everybody's lessons come in their order, so the i-th seed always meets the same scene.
     let seeded = domain.seeds().exemplars.iter().enumerate().filter_map(|(index, exemplar)| {
         let lesson = &lessons[index % lessons.len()];
@@ -99,13 +99,14 @@ fn moment<'a, D: Domain>(domain: &'a D, lesson: &'a Lesson<D::Scene, D::Task>) -
         scene: &lesson.scene,
         task: &lesson.task,
         mentioned: lesson.mentioned.as_ref(),
+        handled: &[],
     }
 }
 
 /// The commonest name of each type.
-fn names<D: Domain>(domain: &D) -> BTreeMap<Symbol, String> {
+fn names<D: Domain>(domain: &D, edition: Edition) -> BTreeMap<Symbol, String> {
     let mut best: BTreeMap<Symbol, (u32, String)> = BTreeMap::new();
-    for (name, meanings) in &domain.lexicon().names {
+    for (name, meanings) in &domain.lexicon(edition).names {
         for meaning in meanings {
             let known = best.get(&meaning.kind);
             if known.is_none_or(|(count, _)| meaning.count > *count) {

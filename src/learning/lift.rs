@@ -19,7 +19,8 @@ pub fn lift<D: Domain>(
 ) -> Exemplar {
     let settings = recipe.settings();
     let known = |word: &str| recipe.words().lookup(word).is_some();
-    let abstractor = Abstractor::new(domain.lexicon(), &settings.abstraction, &known);
+    let abstractor =
+        Abstractor::new(domain.lexicon(settings.words.edition), &settings.abstraction, &known);
     let whole = abstractor.read(&lesson.utterance).whole();
     let lifted = lift_clause(domain, recipe, lesson, &whole);
     // "from the <obj>" goes only when the program does not need it: then the place was no argument.
@@ -40,7 +41,8 @@ fn lift_clause<D: Domain>(
     clause: &Clause,
 ) -> LiftedProgram {
     let before = lesson.mentioned.as_ref();
-    let referents = resolve(domain, &lesson.scene, &clause.mentions, before);
+    let edition = recipe.settings().words.edition;
+    let referents = resolve(domain, edition, &lesson.scene, &clause.mentions, before);
     let acts_on = |kind: &&Symbol| lesson.program.steps.iter().any(|s| s.args.contains(kind));
     let meant: Vec<Option<&Symbol>> = referents
         .types
@@ -52,7 +54,7 @@ fn lift_clause<D: Domain>(
     let held = domain.held(&lesson.scene).filter(|_| recipe.settings().lifting.held);
     // "In the sink" says how, not what: another wording need not say it. But where a task ends is
     // said of each thing anew.
-    let lexicon = domain.lexicon();
+    let lexicon = domain.lexicon(edition);
     let keeps = recipe.settings().abstraction.lists.is_some();
     let goal = goal(&lexicon.roles, &lesson.program);
     let stays = |arg: &Symbol| {

@@ -143,6 +143,7 @@ impl Mind {
             known,
             reranker: self.reranker.as_ref(),
             seeds: self.seeds,
+            edition: settings.words.edition,
         }
     }
 

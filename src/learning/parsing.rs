@@ -248,7 +248,7 @@ fn features<'a, D: Domain>(
         let reason = "the recipe lacks the section [parser.features] or [abstraction.lists]";
         return Err(TrainError::failed(reason));
     };
-    let lexicon = domain.lexicon();
+    let lexicon = domain.lexicon(settings.words.edition);
     let background = Background {
         lists,
         adjectives: &lexicon.adjectives,

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +10,7 @@ use crate::numerics::NumericsVersion;
 use crate::parser::{
     ExemplarSettings, FeaturesSettings, GrammarSettings, Seq2SeqSettings, TrainFault, WordTable,
 };
+use crate::world::Edition;
 
 /// Settings only, with a digest: everything that decides what a mind becomes, beside the lessons.
 #[derive(Debug, Clone)]
@@ -32,12 +33,15 @@ pub struct RecipeSettings {
     pub reranker: RerankerSettings,
 }
 
-/// Which word vectors.
+/// Which words it knows: the vectors, and what things are called.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WordSettings {
     /// The name of a table that ships.
     pub table: String,
+    /// Which edition of the domain's names and words.
+    #[serde(default, skip_serializing_if = "Edition::is_first")]
+    pub edition: Edition,
 }
 
 /// How lessons become exemplars.
@@ -104,7 +108,8 @@ pub struct RecipeError {
 }
 
 const PAPER: &str = include_str!("../../data/recipes/paper.toml");
-const DEFAULT: &str = include_str!("../../data/recipes/default.toml");
+const DEFAULT_1: &str = include_str!("../../data/recipes/default-1.toml");
+const DEFAULT_2: &str = include_str!("../../data/recipes/default-2.toml");
 /// Trains in a few milliseconds, for tests and simulations.
 const TINY: &str = include_str!("../../data/recipes/tiny.toml");
 // The paper's baseline, and its two halves alone.
@@ -114,13 +119,18 @@ const SEQ2SEQ_GRAMMAR: &str = include_str!("../../data/recipes/seq2seq-grammar.t
 
 impl Recipe {
     /// The names of the recipes that ship for people; `tiny` is for tests.
-    pub const BUILTIN: [&'static str; 5] =
-        ["default", "paper", "grammar", "seq2seq", "seq2seq-grammar"];
+    pub const BUILTIN: [&'static str; 6] =
+        ["default-1", "default-2", "paper", "grammar", "seq2seq", "seq2seq-grammar"];
+    /// What the name `default` stands for today. It is resolved where a person or a study begins, and
+    /// what is recorded has the permanent name.
+    pub const DEFAULT: &'static str = "default-2";
 
     /// The TOML text of a recipe that ships.
     pub fn builtin(name: &str) -> Option<&'static str> {
         match name {
-            "default" => Some(DEFAULT),
+            "default" => Recipe::builtin(Recipe::DEFAULT),
+            "default-1" => Some(DEFAULT_1),
+            "default-2" => Some(DEFAULT_2),
             "paper" => Some(PAPER),
             "tiny" => Some(TINY),
             "grammar" => Some(GRAMMAR),
@@ -134,8 +144,20 @@ impl Recipe {
     ///   out of range, or an unknown word table.
     pub fn parse(toml: &str) -> Result<Recipe, RecipeError> {
         // Nearly everybody's records carry a recipe that ships, and all of them are read at waking.
-        const TEXTS: [&str; 6] = [DEFAULT, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
+        const TEXTS: [&str; 7] =
+            [DEFAULT_1, DEFAULT_2, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
         static SHIPPED: [OnceLock<Recipe>; TEXTS.len()] = [const { OnceLock::new() }; TEXTS.len()];
+        // What `default-1` was called when it was the only one.
+        static FORMER: LazyLock<String> =
+            LazyLock::new(|| DEFAULT_1.replacen("\"default-1\"", "\"default\"", 1));
+        static FORMER_READ: OnceLock<Recipe> = OnceLock::new();
+        if toml == *FORMER {
+            if let Some(recipe) = FORMER_READ.get() {
+                return Ok(recipe.clone());
+            }
+            let recipe = Recipe::parse_anew(toml)?;
+            return Ok(FORMER_READ.get_or_init(|| recipe).clone());
+        }
         let Some(index) = TEXTS.iter().position(|text| *text == toml) else {
             return Recipe::parse_anew(toml);
         };
@@ -361,6 +383,10 @@ mod tests {
         let changed = text.replace("spelling = false", "spelling = true");
         assert_ne!(changed, text);
         assert_ne!(Recipe::parse(&changed).unwrap().digest(), recipe.digest());
+        // The first edition is what a recipe without an edition reads.
+        let edition = |number| text.replacen("[words]", &format!("[words]\nedition = {number}"), 1);
+        assert_eq!(Recipe::parse(&edition(1)).unwrap().digest(), recipe.digest());
+        assert_ne!(Recipe::parse(&edition(2)).unwrap().digest(), recipe.digest());
     }
 
     #[test]
@@ -379,6 +405,14 @@ mod tests {
         check("split = \"and\"", "split = \"often\"", "expected one of `and`, `clauses`, `verbs`");
         check("name = \"tiny\"", "name = \"ti ny\"", "expected 1 to 64 letters");
         check("table = \"paper\"", "table = \"none\"", "there is no word table \"none\"");
+        let edition = |number: &str| format!("table = \"paper\"\nedition = {number}");
+        for number in ["0", "3", "-1", "9223372036854775807"] {
+            let error = Recipe::parse(&text.replace("table = \"paper\"", &edition(number)));
+            let error = error.unwrap_err();
+            let line = text[..text.find("table").unwrap()].matches('\n').count() + 2;
+            assert_eq!(error.line, line, "{error}");
+            assert!(error.reason.ends_with("expected 1 or 2"), "{error}");
+        }
         check("kind = \"exemplar\"", "kind = \"oracle\"", "expected one of `exemplar`");
         check("hidden = 8\n", "hidden = 0\n", "a number between 1 and 512");
         check("hidden = 16\n", "hidden = 0\n", "allowed is between 1 and 1024");

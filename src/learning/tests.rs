@@ -35,7 +35,10 @@ fn lesson(utterance: &str, program: &str, scene: &Scene) -> BenchLesson {
 
 fn ask(mind: &Mind, scene: &Scene, utterance: &str) -> Answer {
     let bench = Bench::new();
-    mind.interpret(Moment { domain: &bench, scene, task: &(), mentioned: None }, &say(utterance))
+    mind.interpret(
+        Moment { domain: &bench, scene, task: &(), mentioned: None, handled: &[] },
+        &say(utterance),
+    )
 }
 
 fn understood(answer: &Answer) -> String {

@@ -47,7 +47,7 @@ pub fn train<D: Domain>(
     let (reranker, figures) = Reranker::train(
         &recipe.settings().reranker,
         recipe.words(),
-        symbols(domain, &exemplars),
+        symbols(domain, recipe, &exemplars),
         domain.feature_count(),
         seed(recipe, "reranker"),
         &history,
@@ -82,9 +82,9 @@ fn clashes(exemplars: &[Exemplar]) -> bool {
 }
 
 /// Everything that programs may consist of.
-fn symbols<D: Domain>(domain: &D, exemplars: &[Exemplar]) -> Vec<Symbol> {
+fn symbols<D: Domain>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Vec<Symbol> {
     let operators = domain.signature().operators.iter().map(|operator| operator.name.clone());
-    let meanings = domain.lexicon().names.values().flatten();
+    let meanings = domain.lexicon(recipe.settings().words.edition).names.values().flatten();
     let kinds = meanings.map(|meaning| meaning.kind.clone());
     let args = exemplars.iter().flat_map(|exemplar| &exemplar.program.steps).flat_map(|s| &s.args);
     let constants = args.filter_map(|arg| match arg {

@@ -179,7 +179,8 @@ fn shown(value: Option<&Value>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::events::{Report, RetrainCompleted, SessionClosed};
+    use crate::events::{Interpreted, Report, RetrainCompleted, SessionClosed};
+    use crate::language::{Accounted, Answer, Evidence, Mood, Outcome, Use, Utterance};
 
     fn completed(threshold: f32) -> Event {
         let report = Report { exemplars: 44, threshold, ..Report::default() };
@@ -204,6 +205,37 @@ mod tests {
         assert_eq!(zero.field, "report.threshold");
         let closed = Event::SessionClosed(SessionClosed { reason: "enough".to_owned() });
         assert_eq!(Difference::of_events(3, &closed, &completed(0.5)).unwrap().field, "kind");
+    }
+
+    #[test]
+    fn what_words_chose_and_were_used_for_is_part_of_an_answer() {
+        let interpreted = |change: fn(&mut Answer)| {
+            let evidence = Evidence::default();
+            let outcome = Outcome::NotSure;
+            let mut answer = Answer { outcome, evidence, mentioned: None, chosen: Vec::new() };
+            change(&mut answer);
+            let utterance = Utterance::new("do not wash mug 2").unwrap();
+            let (scene_after, mind) = (Digest::ZERO, Digest::ZERO);
+            let event = Interpreted { utterance, answer, actions_before: 0, scene_after, mind };
+            Event::Interpreted(event)
+        };
+        let plain = interpreted(|_| ());
+        type Change = (&'static str, fn(&mut Answer));
+        let changes: [Change; 3] = [
+            ("answer.chosen", |answer| answer.chosen = vec![vec![Some("Mug 2".to_owned())]]),
+            ("answer.evidence.mood", |answer| {
+                answer.evidence.mood = Some(Mood::Forbidden { word: "not".to_owned() });
+            }),
+            ("answer.evidence.accounting", |answer| {
+                let word = "wash".to_owned();
+                answer.evidence.accounting = vec![Accounted { word, used: Use::Verb }];
+            }),
+        ];
+        for (field, change) in changes {
+            let found = Difference::of_events(3, &plain, &interpreted(change)).unwrap();
+            assert_eq!((&*found.field, &*found.recorded), (field, "nothing"));
+            assert_eq!(Difference::of_events(3, &plain, &plain), None);
+        }
     }
 
     #[test]

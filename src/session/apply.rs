@@ -167,12 +167,15 @@ fn interpret<D: Domain>(
             episode.unexplained.extend(guess);
             let mut scene = D::Scene::clone(&episode.scene);
             for (index, step) in program.steps.iter().enumerate() {
+                let on = event.answer.chosen_for(index);
                 let bound =
-                    domain.step(&mut scene, &episode.task, step).map_err(|error| Divergence {
-                        seq,
-                        field: "a carried-out step",
-                        recorded: step.to_string(),
-                        recomputed: format!("infeasible: {error}"),
+                    domain.step_on(&mut scene, &episode.task, step, on).map_err(|error| {
+                        Divergence {
+                            seq,
+                            field: "a carried-out step",
+                            recorded: step.to_string(),
+                            recomputed: format!("infeasible: {error}"),
+                        }
                     })?;
                 let recorded = bindings.get(index).cloned().unwrap_or_default();
                 agree(seq, "binding", recorded.join(", "), bound.join(", "))?;
@@ -180,6 +183,8 @@ fn interpret<D: Domain>(
             }
             episode.scene = Arc::new(scene);
         }
+        // A question or a prohibition is not there to be taught.
+        Outcome::NotSure if !event.answer.asks() => {}
         outcome @ (Outcome::Impossible { .. } | Outcome::NotSure) => {
             let said = unexplained(matches!(outcome, Outcome::NotSure));
             episode.unexplained.push(said);

@@ -171,19 +171,21 @@ fn say<D: Domain>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
         return Err(Rejection::EpisodeFull.into());
     }
     let mind = session.mind.as_ref().expect("the shell installs the state's mind before commands");
+    let handled = episode.handled();
     let moment = Moment {
         domain,
         scene: &*episode.scene,
         task: &*episode.task,
         mentioned: episode.mentioned.as_ref(),
+        handled: &handled,
     };
     let answer = mind.interpret(moment, &utterance);
 
     let mut scene = D::Scene::clone(&episode.scene);
     if let Outcome::Understood { program, .. } = &answer.outcome {
-        for step in &program.steps {
+        for (index, step) in program.steps.iter().enumerate() {
             domain
-                .step(&mut scene, &episode.task, step)
+                .step_on(&mut scene, &episode.task, step, answer.chosen_for(index))
                 .expect("the interpreter ran this program on the same scene");
         }
     }

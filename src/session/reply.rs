@@ -17,6 +17,7 @@ pub struct Reply {
 /// One event as its person is told of it: without scenes and digests that nobody reads.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[allow(clippy::large_enum_variant, reason = "nearly all that is told are answers")]
 pub enum Told {
     Opened {
         recipe: String,

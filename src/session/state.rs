@@ -80,6 +80,13 @@ pub struct Episode<S, T> {
     pub unexplained: Vec<Arc<Unexplained<S>>>,
 }
 
+impl<S, T> Episode<S, T> {
+    /// The names of the things that were acted on, newest first; one may come again.
+    pub fn handled(&self) -> Vec<String> {
+        self.actions.iter().rev().flat_map(|action| action.binding.iter().rev()).cloned().collect()
+    }
+}
+
 /// A primitive that was carried out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Action {

@@ -29,7 +29,12 @@ pub struct Ablation {
 struct Difference {
     name: String,
     /// Settings of the recipe to replace, in its own sections.
+    #[serde(default)]
     set: toml::Table,
+    /// Settings to leave out, each named from its section on: `execution.carrying`. What a recipe
+    /// need not have cannot be replaced by nothing.
+    #[serde(default)]
+    unset: Vec<String>,
 }
 
 /// A recipe with one difference taken back.
@@ -60,9 +65,12 @@ impl Ablation {
         };
         let table: toml::Table = toml::from_str(base).map_err(|error| error.to_string())?;
         let mut variants = vec![parse("nothing", base)?];
-        for Difference { name, set } in &self.differences {
+        for Difference { name, set, unset } in &self.differences {
             let mut changed = table.clone();
             merge(&mut changed, set);
+            if let Some(path) = unset.iter().find(|path| !leave_out(&mut changed, path)) {
+                return Err(format!("difference {name:?}: this recipe has no {path:?}"));
+            }
             if changed == table {
                 return Err(format!("difference {name:?} changes nothing in this recipe"));
             }
@@ -81,6 +89,17 @@ fn merge(table: &mut toml::Table, set: &toml::Table) {
                 table.insert(key.clone(), value.clone());
             }
         }
+    }
+}
+
+/// - returns: whether there was a setting of this name.
+fn leave_out(table: &mut toml::Table, path: &str) -> bool {
+    match path.split_once('.') {
+        None => table.remove(path).is_some(),
+        Some((section, rest)) => match table.get_mut(section) {
+            Some(toml::Value::Table(inner)) => leave_out(inner, rest),
+            _ => false,
+        },
     }
 }
 
@@ -263,6 +282,24 @@ mod tests {
     }
 
     #[test]
+    fn a_setting_that_a_recipe_need_not_have_is_left_out() {
+        let base = Recipe::builtin("default-2").expect("it ships");
+        let without = |path: &str| {
+            let list = format!("[[difference]]\nname = \"x\"\nunset = [\"{path}\"]\n");
+            Ablation::parse(&list).unwrap().variants(base)
+        };
+        let found = without("execution.carrying").unwrap();
+        assert!(found[0].recipe.settings().execution.carrying.is_some());
+        assert!(found[1].recipe.settings().execution.carrying.is_none());
+        for path in ["execution.carry", "execution.carrying.leaving.x", "", "."] {
+            let refused = without(path).unwrap_err();
+            assert!(refused.contains(&format!("has no {path:?}")), "{refused}");
+        }
+        // What every recipe must have is missed when the variant is read.
+        assert!(without("execution.polarity").unwrap_err().starts_with("difference \"x\""));
+    }
+
+    #[test]
     fn a_list_says_whether_it_adds() {
         let list = "[[difference]]\nname = \"x\"\nset.lifting.held = true\n";
         assert!(!Ablation::parse(list).unwrap().adds());
@@ -272,7 +309,8 @@ mod tests {
     #[test]
     fn the_lists_that_ship_fit_the_recipes_that_ship() {
         let lists = [
-            ("default", include_str!("../../tools/ablation.toml"), false),
+            ("default-1", include_str!("../../tools/ablation.toml"), false),
+            ("default-2", include_str!("../../tools/ablation-2.toml"), false),
             ("paper", include_str!("../../tools/additions.toml"), true),
         ];
         for (recipe, list, adds) in lists {

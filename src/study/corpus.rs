@@ -1,7 +1,7 @@
 //! Reading recorded sentences: one JSON object a line, plain or gzipped. Lines that are no rows are
 //! counted and shown, never guessed at.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use flate2::read::MultiGzDecoder;
 use serde::Deserialize;
 
 use crate::ids::UserId;
-use crate::language::{Program, Step, Utterance};
+use crate::language::{Program, Step, Symbol, Utterance};
 use crate::world::household::{Kind, Room};
 
 /// One recorded sentence with what it was recorded for. Only the sentence ever reaches a parser.
@@ -30,6 +30,10 @@ pub struct Row {
     pub egocentric: bool,
     /// Whether what it toggles is on at first. Recordings do not tell, and lamps are off there.
     pub on: bool,
+    /// What the recorded step before it left in the hand, where that step is known and says so.
+    pub hand: Option<Symbol>,
+    /// What the recorded step after it meant, where that step is known.
+    pub next: Option<Program>,
 }
 
 /// What a file held: the usable rows, and what was passed over.
@@ -132,7 +136,24 @@ impl Corpus {
                 corpus.bad.push(BadLine { line: index + 1, reason });
             }
         }
+        corpus.relate();
         Ok(corpus)
+    }
+
+    /// Tells each step what stood before and after it in its task.
+    fn relate(&mut self) {
+        let place = |row: &Row| {
+            let (task, number) = row.id.rsplit_once('/')?;
+            Some((task.to_owned(), number.parse::<u32>().ok()?))
+        };
+        let programs: BTreeMap<(String, u32), Program> =
+            self.steps.iter().filter_map(|row| Some((place(row)?, row.program.clone()))).collect();
+        for row in &mut self.steps {
+            let Some((task, number)) = place(row) else { continue };
+            let at = |number: Option<u32>| programs.get(&(task.clone(), number?));
+            row.hand = at(number.checked_sub(1)).and_then(left_in_hand);
+            row.next = at(number.checked_add(1)).cloned();
+        }
     }
 
     /// - returns: whether the row can be used.
@@ -169,7 +190,8 @@ impl Corpus {
         program.steps.iter().try_for_each(check_step)?;
         let sentence = Utterance::new(&text).map_err(|error| format!("{text:?}: {error}"))?;
         let (id, user, egocentric) = (line.id, line.user, line.ego);
-        rows.push(Row { id, sentence, label, program, room, user, egocentric, on: false });
+        let (on, hand, next) = (false, None, None);
+        rows.push(Row { id, sentence, label, program, room, user, egocentric, on, hand, next });
         Ok(true)
     }
 }
@@ -187,8 +209,17 @@ impl Row {
             user: "u1".to_owned(),
             egocentric: false,
             on: false,
+            hand: None,
+            next: None,
         }
     }
+}
+
+/// What a program leaves in the hand; none as well when it does not touch it.
+fn left_in_hand(program: &Program) -> Option<Symbol> {
+    let handles = |step: &&Step| step.operator == "PICKUP" || step.operator == "PUT";
+    let last = program.steps.iter().rev().find(handles)?;
+    (last.operator == "PICKUP").then(|| last.args[0].clone())
 }
 
 /// - errors: an action that is no primitive, a wrong number of things, or an unknown kind of thing.
@@ -243,6 +274,21 @@ mod tests {
         assert_eq!(corpus.bad.iter().map(|bad| bad.line).collect::<Vec<_>>(), [2, 5, 6, 7]);
         assert!(corpus.bad[2].reason.contains("scene 100 is in no room"), "{:?}", corpus.bad);
         assert!(corpus.bad[3].reason.contains("empty"), "{:?}", corpus.bad);
+    }
+
+    #[test]
+    fn a_step_knows_what_stood_before_and_after_it() {
+        let walk = GOOD.replace("a/0/1", "a/0/2").replace("PICKUP Pan", "GOTO SinkBasin");
+        let put = GOOD.replace("a/0/1", "a/0/3").replace("PICKUP Pan", "PUT Pan SinkBasin");
+        let other = walk.replace("a/0/2", "b/0/2");
+        let corpus = corpus(&[GOOD, &put, &walk, &other]);
+        let known = |row: &Row| (row.hand.clone(), row.next.as_ref().map(Program::to_string));
+        let known: Vec<_> = corpus.steps.iter().map(known).collect();
+        let pan = Some(Symbol::new("Pan"));
+        assert_eq!(known[0], (None, Some("GOTO SinkBasin".to_owned())));
+        assert_eq!(known[1], (None, None));
+        assert_eq!(known[2], (pan, Some("PUT Pan SinkBasin".to_owned())));
+        assert_eq!(known[3], (None, None));
     }
 
     #[test]

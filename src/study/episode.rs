@@ -14,8 +14,8 @@ use super::scenes::{Clashes, Stages};
 use super::score::{self, Verdict};
 use crate::language::{Answer, Program, Symbol, tokens};
 use crate::learning::{Lesson, Mind, Recipe, train};
-use crate::world::Domain;
 use crate::world::household::{Household, Kind, Scene, Task};
+use crate::world::{Domain, Edition};
 
 /// Other things that the taught sentence is said about.
 const THINGS: usize = 3;
@@ -229,7 +229,7 @@ fn retold(tests: &Tests<'_>, number: usize, lesson: &Row) -> Vec<Row> {
     let handles = |operator: &str| operator == "PICKUP" || operator == "PUT";
     let handled = lesson.program.steps.iter().find(|step| handles(step.operator.as_str()));
     let Some(thing) = handled.and_then(|step| step.args.first()) else { return Vec::new() };
-    let lexicon = tests.household.lexicon();
+    let lexicon = tests.household.lexicon(Edition::First);
     let names = plain_names(lexicon);
     let args: BTreeSet<&Symbol> = lesson.program.steps.iter().flat_map(|step| &step.args).collect();
     let mistakable =
@@ -315,9 +315,9 @@ impl Ask<'_> {
     }
 
     fn primitives(&mut self, rows: &[&Row]) -> Asked {
-        let programs = self.programs;
+        let (programs, staging) = (self.programs, self.tests.stages.staging);
         self.each(rows, |row, scene, answer, explain| {
-            let verdict = score::judge_primitive(&row.program, &answer.outcome);
+            let (verdict, _) = score::judge_step(row, staging, &answer.outcome);
             let failed = verdict != Verdict::Right;
             let failure = failed.then(|| {
                 let mut failure = explain.primitive(row, scene, verdict, answer);

@@ -192,8 +192,9 @@ impl<'a> Explain<'a> {
 
     fn mentions(&self, sentence: &Utterance) -> Vec<Mention> {
         let known = |word: &str| self.recipe.words().lookup(word).is_some();
-        let abstraction = &self.recipe.settings().abstraction;
-        let abstractor = Abstractor::new(self.household.lexicon(), abstraction, &known);
+        let settings = self.recipe.settings();
+        let lexicon = self.household.lexicon(settings.words.edition);
+        let abstractor = Abstractor::new(lexicon, &settings.abstraction, &known);
         abstractor.read(sentence).whole().mentions
     }
 
@@ -373,8 +374,12 @@ mod tests {
         let recipe = Recipe::parse(Recipe::builtin("tiny").unwrap()).unwrap();
         let explain = Explain::new(&household, &recipe);
         let row = Row::about(Room::Kitchen, "wuzzle the mug", "PICKUP Mug");
-        let not_sure =
-            Answer { outcome: Outcome::NotSure, evidence: Evidence::default(), mentioned: None };
+        let not_sure = Answer {
+            outcome: Outcome::NotSure,
+            evidence: Evidence::default(),
+            mentioned: None,
+            chosen: Vec::new(),
+        };
         let failed = |number: usize| {
             let verdict = [Verdict::Wrong, Verdict::NotSure][number % 2];
             let row = Row { id: number.to_string(), ..row.clone() };

@@ -105,7 +105,7 @@ pub fn lessons(
     material: &Material<'_>,
 ) -> Result<LessonsReport, TrainError> {
     let household = Household::new();
-    let stages = Stages::new(&household);
+    let stages = Stages::new(&household).staged(setting.staging);
     let mut base = Base::new(material.protocol, setting);
     let mut episodes = Vec::new();
     for &seed in setting.seeds {

@@ -5,7 +5,9 @@
 //! corpus knows is for judging the answer.
 
 pub mod ablation;
+mod carried;
 mod cells;
+pub mod conversation;
 pub mod corpus;
 mod draw;
 mod episode;
@@ -30,3 +32,4 @@ pub mod scenes;
 pub mod score;
 mod seeds;
 mod table;
+pub mod transcript;

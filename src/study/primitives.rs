@@ -12,11 +12,12 @@ use super::figures::{Reasons, Shares, Spread, share};
 use super::parallel::in_order;
 use super::promise::{Kept, Promise, surety};
 use super::report::{Base, Setting};
-use super::scenes::{Clashes, Stages};
+use super::scenes::{Clashes, Stages, Staging};
 use super::score::{self, Verdict};
 use crate::grounding::Moment;
 use crate::language::Answer;
 use crate::learning::{Mind, TrainError, train};
+use crate::world::Domain;
 use crate::world::household::{Household, Scene, Task};
 
 /// The actions that stand for one primitive.
@@ -44,6 +45,9 @@ pub struct PrimitivesReport {
     pub promise: Promise,
     /// The same sentences with other things of the same name in the scene.
     pub clashes: Shares,
+    /// What staging what people held comes to; none unless it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held: Option<Held>,
     /// Per seed, the shares of that seed alone.
     pub by_seed: Vec<Shares>,
     /// What the training of the last seed measured about itself.
@@ -55,6 +59,15 @@ pub struct PrimitivesReport {
     /// Failures without their sentences, by what was asked.
     #[serde(skip)]
     pub cases: BTreeMap<&'static str, Vec<Failure>>,
+}
+
+/// Sentences said with what they carry in the hand.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Held {
+    /// Walks that were asked for with something in the hand.
+    pub walks: usize,
+    /// Of all primitives, those that are right for doing the next recorded step as well.
+    pub ahead: f64,
 }
 
 /// Shares of single people, averaged. Nobody is named.
@@ -116,7 +129,7 @@ pub fn is_untaught(row: &Row) -> bool {
 /// - errors: a training that fails.
 pub fn primitives(setting: &Setting<'_>, rows: &[Row]) -> Result<PrimitivesReport, TrainError> {
     let household = Household::new();
-    let stages = Stages::new(&household);
+    let stages = Stages::new(&household).staged(setting.staging);
     let all: Vec<&Row> = rows.iter().filter(|row| is_primitive(row)).collect();
     let untaught: Vec<&Row> = rows.iter().filter(|row| is_untaught(row)).collect();
 
@@ -159,6 +172,10 @@ struct Judged {
     user: String,
     untaught: bool,
     verdict: Verdict,
+    /// Right, and the next recorded step was done as well.
+    ahead: bool,
+    /// A walk with something in the hand.
+    carries: bool,
     distance: f32,
     sure: f64,
     /// With things of the same name about; none for the untaught, and where no such scene exists.
@@ -182,14 +199,19 @@ fn judge(
     let scene = set(Clashes::Avoided, "scene")?;
     let answer = answer(household, mind, &scene, row);
     let untaught = is_untaught(row);
-    let verdict = match untaught {
-        true => score::judge_taught(household, &scene, &row.program, &answer.outcome),
-        false => score::judge_primitive(&row.program, &answer.outcome),
+    let (verdict, ahead) = match untaught {
+        true => {
+            let taught = score::judge_taught(household, &scene, &row.program, &answer.outcome);
+            (taught, false)
+        }
+        false => score::judge_step(row, stages.staging, &answer.outcome),
     };
+    let walks = score::core(&row.program).is_some_and(score::walks);
+    let carries = walks && household.held(&scene).is_some();
     let clashing = match set(Clashes::Allowed, "clashing scene") {
         Ok(scene) if !untaught => {
             let answer = self::answer(household, mind, &scene, row);
-            let verdict = score::judge_primitive(&row.program, &answer.outcome);
+            let (verdict, _) = score::judge_step(row, stages.staging, &answer.outcome);
             Some((verdict, score::distance(&answer.evidence)))
         }
         _ => None,
@@ -202,13 +224,13 @@ fn judge(
     let distance = score::distance(&answer.evidence);
     let sure = surety(explain.recipe(), distance, answer.evidence.threshold);
     let (label, user) = (row.label.clone(), row.user.clone());
-    Ok(Judged { label, user, untaught, verdict, distance, sure, clashing, failure })
+    Ok(Judged { label, user, untaught, verdict, ahead, carries, distance, sure, clashing, failure })
 }
 
 /// The answer to a row's sentence, said in a scene at the start of an episode.
 pub(super) fn answer(household: &Household, mind: &Mind, scene: &Scene, row: &Row) -> Answer {
     let task = Task::free();
-    let moment = Moment { domain: household, scene, task: &task, mentioned: None };
+    let moment = Moment { domain: household, scene, task: &task, mentioned: None, handled: &[] };
     mind.interpret(moment, &row.sentence)
 }
 
@@ -245,6 +267,10 @@ fn summarise(
         let failed = judged.iter().filter_map(|one| one.failure.as_ref());
         (name, Failure::draw(failed, name, setting.cases))
     });
+    let held = (setting.staging == Staging::Held).then(|| Held {
+        walks: primitives.iter().filter(|one| one.carries).count(),
+        ahead: share(primitives.iter().filter(|one| one.ahead).count(), primitives.len()),
+    });
     let mut reasons = Reasons::default();
     for failure in judged.iter().filter_map(|one| one.failure.as_ref()) {
         reasons.add(failure.verdict, &failure.reason);
@@ -259,6 +285,7 @@ fn summarise(
         by_person,
         promise,
         clashes: Shares::of(&clashing),
+        held,
         by_seed,
         training,
         reasons,

@@ -6,7 +6,7 @@ use crate::language::{Program, Symbol, Utterance};
 use crate::world::Lexicon;
 
 /// Words of the longest name that is looked for.
-const NAME_WORDS_MAX: usize = 5;
+pub(super) const NAME_WORDS_MAX: usize = 5;
 
 /// The name that people use most for a kind and that means this kind before any other: what to
 /// call it without being misunderstood. Not every kind has one.
@@ -62,7 +62,7 @@ pub fn rename(
 }
 
 /// The name that the words are, as the lexicon writes it, in the singular or the plural.
-fn singular(lexicon: &Lexicon, words: &[String]) -> Option<String> {
+pub(super) fn singular(lexicon: &Lexicon, words: &[String]) -> Option<String> {
     let (last, first) = words.split_last()?;
     let with = |last: &str| {
         let mut name = first.to_vec();
@@ -89,13 +89,14 @@ pub fn replace(program: &Program, from: &Symbol, to: &Symbol) -> Program {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::Domain;
     use crate::world::household::Household;
+    use crate::world::{Domain, Edition};
 
     fn check(sentence: &str, from: &str, name: &str, expected: Option<&str>) {
         let household = Household::new();
         let sentence = Utterance::new(sentence).unwrap();
-        let renamed = rename(household.lexicon(), &sentence, &Symbol::new(from), name);
+        let renamed =
+            rename(household.lexicon(Edition::First), &sentence, &Symbol::new(from), name);
         assert_eq!(renamed.as_ref().map(Utterance::as_str), expected, "{sentence}");
     }
 
@@ -115,7 +116,7 @@ mod tests {
     #[test]
     fn a_plain_name_means_its_kind_first() {
         let household = Household::new();
-        let lexicon = household.lexicon();
+        let lexicon = household.lexicon(Edition::First);
         let names = plain_names(lexicon);
         assert!(names.len() > 60, "{}", names.len());
         for (kind, name) in names {

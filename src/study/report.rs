@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::parallel::Progress;
 use super::people::People;
+use super::scenes::Staging;
 use crate::learning::Recipe;
 
 /// What a protocol is run with.
@@ -24,6 +25,7 @@ pub struct Setting<'a> {
     /// Sentences that an episode teaches.
     pub lessons: usize,
     pub teachers: Teachers,
+    pub staging: Staging,
     /// Failures kept of each kind, with their sentences.
     pub failures: usize,
     /// Failures drawn of each verdict, without their sentences.
@@ -49,6 +51,9 @@ pub struct Base {
     pub recipe_digest: String,
     pub people: String,
     pub seeds: Vec<u64>,
+    /// How scenes were staged; none for plain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub staging: Option<String>,
     /// Rows left out because what they mean cannot be done in any scene that could be set.
     pub unstaged: Unstaged,
 }
@@ -95,6 +100,7 @@ impl Base {
             recipe_digest: setting.recipe.digest().short(),
             people: setting.people.to_string(),
             seeds: setting.seeds.to_vec(),
+            staging: (setting.staging != Staging::Plain).then(|| setting.staging.to_string()),
             unstaged: Unstaged::default(),
         }
     }

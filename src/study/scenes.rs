@@ -2,12 +2,15 @@
 //! that room.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::str::FromStr;
 
+use super::carried::carried;
 use super::corpus::Row;
-use crate::language::Symbol;
+use crate::language::{Program, Symbol};
 use crate::numerics::Rng;
-use crate::world::household::{Household, MatchingScene, Scene};
-use crate::world::{Domain, Lexicon};
+use crate::world::household::{Household, MatchingScene, Scene, Task};
+use crate::world::{Domain, Edition, Lexicon};
 
 /// Other things in a scene, where the room has so many.
 pub const OTHERS: usize = 10;
@@ -21,29 +24,93 @@ pub enum Clashes {
     Allowed,
 }
 
+/// Whether a scene also has what only the sentence tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Staging {
+    /// What the program needs, and nothing else: hands are empty on a walk, lamps are off.
+    #[default]
+    Plain,
+    /// "Bring the mug to the sink" is said with the mug in the hand, and "turn off the lamp" while
+    /// the lamp is on.
+    Held,
+}
+
+impl fmt::Display for Staging {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Staging::Plain => "plain",
+            Staging::Held => "held",
+        })
+    }
+}
+
+impl FromStr for Staging {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Staging, String> {
+        match text {
+            "plain" => Ok(Staging::Plain),
+            "held" => Ok(Staging::Held),
+            other => Err(format!("{other:?} is neither plain nor held")),
+        }
+    }
+}
+
 /// Sets scenes.
 pub struct Stages<'a> {
+    household: &'a Household,
     lexicon: &'a Lexicon,
+    pub staging: Staging,
     /// From a kind to what it may be called.
     names: BTreeMap<Symbol, BTreeSet<&'a str>>,
 }
 
 impl<'a> Stages<'a> {
     pub fn new(household: &'a Household) -> Stages<'a> {
-        let lexicon = household.lexicon();
-        Stages { lexicon, names: names_by_kind(lexicon) }
+        let lexicon = household.lexicon(Edition::First);
+        let (names, staging) = (names_by_kind(lexicon), Staging::Plain);
+        Stages { household, lexicon, staging, names }
+    }
+
+    pub fn staged(self, staging: Staging) -> Stages<'a> {
+        Stages { staging, ..self }
     }
 
     /// The scene for a row, drawn by `rng`: its program runs in it.
     ///
     /// - errors: why there is none, in a sentence.
     pub fn set(&self, row: &Row, clashes: Clashes, rng: &mut Rng) -> Result<Scene, String> {
-        let Row { room, program, on, .. } = row;
-        let (room, on) = (*room, *on);
+        let Row { room, program, .. } = row;
         let clashes = clashes == Clashes::Allowed;
         let seed = rng.next_u64();
-        let scene = MatchingScene { room, program, others: OTHERS, clashes, on, seed };
-        scene.build(self.lexicon)
+        let held = match self.staging {
+            Staging::Plain => None,
+            Staging::Held => carried(self.lexicon, row),
+        };
+        let build = |on: bool| {
+            let room = *room;
+            let scene = MatchingScene { room, program, others: OTHERS, clashes, on, held, seed };
+            scene.build(self.lexicon)
+        };
+        let scene = build(row.on)?;
+        match self.staging == Staging::Held && !row.on && self.contradicted(row, &scene) {
+            true => build(true),
+            false => Ok(scene),
+        }
+    }
+
+    /// Whether the words of a row ask to turn off what is off in the scene.
+    fn contradicted(&self, row: &Row, scene: &Scene) -> bool {
+        let steps = &row.program.steps;
+        let mut toggles = (0..steps.len()).filter(|at| steps[*at].operator == "TOGGLE");
+        let (Some(at), None) = (toggles.next(), toggles.next()) else { return false };
+        let mut scene = scene.clone();
+        for step in &steps[..at] {
+            if self.household.step(&mut scene, &Task::free(), step).is_err() {
+                return false;
+            }
+        }
+        let toggle = Program { steps: vec![steps[at].clone()] };
+        self.household.contradiction(&scene, &row.sentence.tokens(), &toggle).is_some()
     }
 
     /// Whether two kinds may be called the same.
@@ -104,6 +171,32 @@ mod tests {
             met |= clashing.iter().any(|kind| kind == "SideTable" || kind == "DiningTable");
         }
         assert!(met, "no scene had another table, though clashes were allowed");
+    }
+
+    #[test]
+    fn what_people_held_and_what_was_on_is_staged_when_asked_for() {
+        let household = Household::new();
+        let stages = Stages::new(&household);
+        let held = Stages::new(&household).staged(Staging::Held);
+        let carry = Row::about(Room::Kitchen, "take the mug to the sink", "GOTO SinkBasin");
+        let lamp = Row::about(Room::Bedroom, "turn off the desk lamp", "TOGGLE DeskLamp");
+        let is_on = |scene: &Scene| {
+            let things = household.look(scene).things;
+            things
+                .iter()
+                .any(|thing| thing.kind == "DeskLamp" && thing.states.iter().any(|s| s == "on"))
+        };
+        for seed in 0..5 {
+            let scene = set(&held, &carry, Clashes::Avoided, seed).unwrap();
+            assert_eq!(household.held(&scene), Some(Symbol::new("Mug")));
+            let scene = set(&stages, &carry, Clashes::Avoided, seed).unwrap();
+            assert_eq!(household.held(&scene), None);
+            assert!(is_on(&set(&held, &lamp, Clashes::Avoided, seed).unwrap()));
+            assert!(!is_on(&set(&stages, &lamp, Clashes::Avoided, seed).unwrap()));
+            let pick = row(Room::Kitchen, "PICKUP Mug");
+            let [one, other] = [&held, &stages].map(|s| set(s, &pick, Clashes::Avoided, seed));
+            assert_eq!(one, other);
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::corpus::Row;
+use super::scenes::Staging;
 use crate::language::{Evidence, Outcome, Program, Step, Symbol};
 use crate::world::Domain;
 use crate::world::household::{Household, Scene, Task};
@@ -46,6 +48,31 @@ pub fn judge_primitive(gold: &Program, outcome: &Outcome) -> Verdict {
         true => Verdict::Right,
         false => Verdict::Wrong,
     }
+}
+
+/// Judges an answer to a recorded step for one primitive.
+///
+/// - returns: the verdict, and whether it is right for being ahead: with the thing in the hand that
+///   the words carry along, the answer to a walk also puts it down as the next recorded step does.
+pub fn judge_step(row: &Row, staging: Staging, outcome: &Outcome) -> (Verdict, bool) {
+    match (judge_primitive(&row.program, outcome), outcome) {
+        (Verdict::Wrong, Outcome::Understood { program, .. })
+            if staging == Staging::Held && is_ahead(row, program) =>
+        {
+            (Verdict::Right, true)
+        }
+        (verdict, _) => (verdict, false),
+    }
+}
+
+fn is_ahead(row: &Row, answer: &Program) -> bool {
+    let (Some(walk), Some(next)) = (core(&row.program).filter(|step| walks(step)), &row.next)
+    else {
+        return false;
+    };
+    core(next).is_some_and(|step| step.operator == "PUT")
+        && says_core(next, answer)
+        && answer.steps.iter().rev().find(|step| walks(step)) == Some(walk)
 }
 
 /// Whether a program is the core primitive of another and no other manipulation.
@@ -215,6 +242,25 @@ mod tests {
         let gold: Program = "PICKUP Mug".parse().unwrap();
         assert_eq!(judge_primitive(&gold, &impossible("PICKUP Mug")), Verdict::Impossible);
         assert_eq!(judge_primitive(&gold, &Outcome::NotSure), Verdict::NotSure);
+    }
+
+    #[test]
+    fn an_answer_may_be_one_step_ahead() {
+        let row = Row::about(Room::Kitchen, "take the mug to the fridge", "GOTO Fridge");
+        let next = "OPEN Fridge; PUT Mug Fridge; CLOSE Fridge".parse().unwrap();
+        let row = Row { next: Some(next), ..row };
+        let check = |answer: &str, expected: (Verdict, bool)| {
+            assert_eq!(judge_step(&row, Staging::Held, &understood(answer)), expected, "{answer}");
+        };
+        check("GOTO Fridge", (Verdict::Right, false));
+        check("GOTO Fridge; OPEN Fridge; PUT Mug Fridge", (Verdict::Right, true));
+        check("GOTO Fridge; PUT Cup Fridge", (Verdict::Wrong, false));
+        check("GOTO Shelf; PUT Mug Fridge", (Verdict::Wrong, false));
+        check("PICKUP Mug; GOTO Fridge; PUT Mug Fridge", (Verdict::Wrong, false));
+        let ahead = understood("GOTO Fridge; PUT Mug Fridge");
+        assert_eq!(judge_step(&row, Staging::Plain, &ahead), (Verdict::Wrong, false));
+        let alone = Row { next: None, ..row.clone() };
+        assert_eq!(judge_step(&alone, Staging::Held, &ahead), (Verdict::Wrong, false));
     }
 
     #[test]

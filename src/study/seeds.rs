@@ -9,15 +9,15 @@ use super::renaming::plain_names;
 use super::scenes::{Clashes, Stages};
 use crate::language::{Exemplar, Symbol, Utterance, Word};
 use crate::numerics::Rng;
-use crate::world::Domain;
 use crate::world::household::{Household, Kind, Room};
+use crate::world::{Domain, Edition};
 
 /// Draws tried for one seed before it is left out: most pairs of things do not go together.
 const TRIES: usize = 2_000;
 
 /// Each seed once, about things for which it can be done, drawn by seed.
 pub fn rows(household: &Household, stages: &Stages<'_>, seed: u64) -> Vec<Row> {
-    let names = plain_names(household.lexicon());
+    let names = plain_names(household.lexicon(Edition::First));
     let exemplars = household.seeds().exemplars.iter().enumerate();
     let rows = exemplars.filter_map(|(number, exemplar)| {
         let id = format!("seed/{number}");
@@ -82,6 +82,8 @@ fn fill(
         user: String::new(),
         egocentric: false,
         on: false,
+        hand: None,
+        next: None,
     })
 }
 

@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Write};
 use super::failures::Failure;
 use super::figures::{Reasons, Shares, Spread};
 use super::lessons::{Figures, LessonsReport};
-use super::primitives::PrimitivesReport;
+use super::primitives::{Held, PrimitivesReport};
 use super::promise::{Band, Promise};
 use super::report::Base;
 
@@ -25,6 +25,9 @@ impl Display for Base {
             self.people,
             seeds.join(", ")
         )?;
+        if let Some(staging) = &self.staging {
+            writeln!(f, "staging: {staging}")?;
+        }
         if self.unstaged.n > 0 {
             writeln!(f, "{} rows left out: no scene in which they can be done", self.unstaged.n)?;
         }
@@ -46,6 +49,10 @@ impl Display for PrimitivesReport {
         shares(f, "with name clashes", &self.clashes)?;
         for (seed, of_seed) in self.base.seeds.iter().zip(&self.by_seed) {
             shares(f, &format!("  seed {seed} alone"), of_seed)?;
+        }
+        if let Some(Held { walks, ahead }) = self.held {
+            let ahead = percent(ahead);
+            writeln!(f, "\n{walks} walks with a thing in the hand; {ahead} right and ahead")?;
         }
         writeln!(
             f,

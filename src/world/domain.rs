@@ -1,7 +1,7 @@
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::{Lexicon, SeedSet};
+use super::{Edition, Lexicon, Pointing, SeedSet};
 use crate::ids::Digest;
 use crate::language::{Mention, Program, Signature, Step, Symbol};
 
@@ -22,7 +22,8 @@ pub trait Domain: Send + Sync + 'static {
     /// Goes up whenever [`Domain::step`] could give another scene than before.
     fn version(&self) -> u16;
     fn signature(&self) -> &Signature;
-    fn lexicon(&self) -> &Lexicon;
+    /// What things are called in an edition. A domain with one edition gives it for all.
+    fn lexicon(&self, edition: Edition) -> &Lexicon;
     /// What every user starts with.
     fn seeds(&self) -> &SeedSet;
 
@@ -44,6 +45,30 @@ pub trait Domain: Send + Sync + 'static {
         step: &Step,
     ) -> Result<Vec<String>, Infeasible>;
 
+    /// As [`Domain::step`], and argument `i` is bound to the instance with the name `on[i]` (as
+    /// [`Thing::name`] shows it). A missing or empty entry leaves the argument free; entries
+    /// beyond the arguments are not looked at.
+    ///
+    /// - errors: [`Infeasible`], about the named instance; the scene is then unchanged.
+    fn step_on(
+        &self,
+        scene: &mut Self::Scene,
+        task: &Self::Task,
+        step: &Step,
+        on: &[Option<String>],
+    ) -> Result<Vec<String>, Infeasible> {
+        // A world without numbered instances can only refuse what it would not have bound anyway.
+        let mut after = scene.clone();
+        let bound = self.step(&mut after, task, step)?;
+        let mut wished =
+            on.iter().zip(&bound).filter_map(|(name, bound)| Some((name.as_ref()?, bound)));
+        if let Some((name, bound)) = wished.find(|(name, bound)| name != bound) {
+            return Err(Infeasible::because(format!("{step} takes the {bound}, not the {name}")));
+        }
+        *scene = after;
+        Ok(bound)
+    }
+
     /// Whether the task's goal holds.
     fn achieved(&self, scene: &Self::Scene, task: &Self::Task) -> bool;
 
@@ -54,7 +79,9 @@ pub trait Domain: Send + Sync + 'static {
     /// The types that a mention (no pronoun) may mean in this scene, best first: of the types that
     /// share the name, the one with the closest instance. When none of them is in the scene, the
     /// mention's own order, so that the answer can be "there is no … here".
-    fn resolve(&self, scene: &Self::Scene, mention: &Mention) -> Vec<Symbol>;
+    ///
+    /// - `edition`: of the lexicon that the mention was found with.
+    fn resolve(&self, edition: Edition, scene: &Self::Scene, mention: &Mention) -> Vec<Symbol>;
 
     /// The type of what the robot holds.
     fn held(&self, scene: &Self::Scene) -> Option<Symbol>;
@@ -88,9 +115,36 @@ pub trait Domain: Send + Sync + 'static {
         None
     }
 
+    /// Whether the thing that a step would work, such as a switch, is on already.
+    fn is_on(&self, _scene: &Self::Scene, _step: &Step) -> bool {
+        false
+    }
+
     /// Whether a word says of the things of a type what none of them is: "the clean mug" where all
     /// mugs are dirty. A word that names no state says nothing of the kind.
     fn unlike(&self, _scene: &Self::Scene, _kind: &Symbol, _word: &str) -> bool {
+        false
+    }
+
+    /// The instance of a type that words choose, by the name that [`Thing::name`] shows: the
+    /// nearest of those that fit.
+    ///
+    /// - returns: none when the words choose nothing: nothing in them is about instances, all
+    ///   instances fit, or the world does not know what they say.
+    /// - errors: a sentence, when no instance is as the words say: "no Mug here is dirty".
+    fn choose(
+        &self,
+        _scene: &Self::Scene,
+        _kind: &Symbol,
+        _pointing: &Pointing,
+    ) -> Result<Option<String>, String> {
+        Ok(None)
+    }
+
+    /// Whether a word before a name says a state that [`Domain::choose`] looks at: "dirty". Some
+    /// of these words are also verbs and prepositions ("open", "clean", "on"); ask only about a
+    /// word that stands between an article and the name.
+    fn is_instance_word(&self, _word: &str) -> bool {
         false
     }
 
@@ -144,6 +198,19 @@ pub struct Infeasible {
     /// The step that would have to come first, where one step is what is missing: going to what is
     /// out of reach, opening what is shut. Recipes may take it unasked.
     pub first: Option<Step>,
+    /// The instances for `first`, to be passed to [`Domain::step_on`] with it. Empty when the
+    /// refused instance was not chosen: `first` then binds freely.
+    pub first_on: Vec<Option<String>>,
+    /// Whether what the step is for holds already: it is open, it is in the hand. Recipes may pass
+    /// such a step of a lesson over.
+    pub done: bool,
+}
+
+impl Infeasible {
+    /// A refusal that no single step would mend.
+    pub fn because(reason: String) -> Infeasible {
+        Infeasible { reason, first: None, first_on: Vec::new(), done: false }
+    }
 }
 
 /// What a person sees of a scene.

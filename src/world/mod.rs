@@ -2,8 +2,12 @@
 //! knows about mugs.
 
 mod domain;
+mod edition;
 pub mod household;
 mod lexicon;
+mod pointing;
 
 pub use domain::{Domain, Infeasible, Stage, StageError, Thing, View};
+pub use edition::Edition;
 pub use lexicon::{Lexicon, Meaning, SeedSet};
+pub use pointing::Pointing;

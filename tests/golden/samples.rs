@@ -10,8 +10,8 @@ use apprentice::events::{
 };
 use apprentice::ids::{Digest, PublicKey, Seq, Signature, StreamKey, Timestamp, UserId};
 use apprentice::language::{
-    Answer, Answerer, Discarded, Document, Evidence, LiftedUtterance, Near, Outcome, Program,
-    Symbol, Utterance,
+    Accounted, Answer, Answerer, Discarded, Document, Evidence, LiftedUtterance, Mood, Near,
+    Outcome, Program, Symbol, Use, Utterance,
 };
 use serde_json::json;
 
@@ -25,6 +25,9 @@ pub fn samples() -> Vec<(&'static str, Event)> {
         ("interpreted_impossible", Event::Interpreted(interpreted(impossible()))),
         ("interpreted_not_sure", Event::Interpreted(interpreted(Outcome::NotSure))),
         ("interpreted_by_the_baseline", Event::Interpreted(by_the_baseline())),
+        ("interpreted_chosen", Event::Interpreted(chosen())),
+        ("interpreted_forbidden", Event::Interpreted(forbidden())),
+        ("interpreted_left_over", Event::Interpreted(left_over())),
         ("episode_ended", Event::EpisodeEnded(episode_ended(Ending::Achieved))),
         ("episode_ended_abandoned", Event::EpisodeEnded(episode_ended(Ending::Abandoned))),
         ("decomposition_taught", Event::DecompositionTaught(taught())),
@@ -70,6 +73,22 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("interpreted.answer.outcome.impossible.program", "what was understood and not carried out"),
     ("interpreted.answer.outcome.impossible.step", "the step that fails, counted from 0"),
     ("interpreted.answer.outcome.impossible.reason", "why it fails"),
+    (
+        "interpreted.answer.chosen[][]",
+        "per step and argument the thing that words chose; null or absent: the world chooses",
+    ),
+    (
+        "interpreted.answer.evidence.accounting[].word",
+        "a word or phrase; absent: not accounted for",
+    ),
+    (
+        "interpreted.answer.evidence.accounting[].as",
+        "its use: frame, verb, thing, attribute, landmark, harmless or nothing",
+    ),
+    (
+        "interpreted.answer.evidence.mood.forbidden.word",
+        "the word that forbids; likewise asked, told, conditional, later, reordered; absent: a request",
+    ),
     ("interpreted.answer.evidence.lifted[]", "the utterance as the parser saw it, by clause"),
     ("interpreted.answer.evidence.nearest[].exemplar", "a near exemplar, nearest first"),
     ("interpreted.answer.evidence.nearest[].program", "what it stands for"),
@@ -211,9 +230,10 @@ fn interpreted(outcome: Outcome) -> Interpreted {
                     reason: "the Table cannot be picked up".to_owned(),
                 }],
                 reranked: 2,
-                answered_by: Vec::new(),
+                ..Evidence::default()
             },
             mentioned: Some(Symbol::new("Apple")),
+            chosen: Vec::new(),
         },
         actions_before: 4,
         scene_after: Digest::of(b"scene after"),
@@ -231,6 +251,74 @@ fn by_the_baseline() -> Interpreted {
         ..Evidence::default()
     };
     event
+}
+
+/// "Robot, put the second mug on the table": words chose the mug, the world the table.
+fn chosen() -> Interpreted {
+    let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+    let chosen =
+        |names: &[Option<&str>]| names.iter().map(|name| name.map(str::to_owned)).collect();
+    let mut event = interpreted(Outcome::Understood {
+        program: program("PICKUP Mug; PUT Mug DiningTable"),
+        bindings: vec![names(&["Mug 2"]), names(&["Mug 2", "DiningTable"])],
+    });
+    event.utterance = utterance("Robot, put the second mug on the table");
+    event.answer.evidence = Evidence {
+        lifted: vec![LiftedUtterance::parse("put the <obj> on the <obj>")],
+        threshold: 0.5,
+        accounting: accounting(&[
+            ("robot", Use::Frame),
+            ("put", Use::Verb),
+            ("the", Use::Harmless),
+            ("second", Use::Attribute),
+            ("mug", Use::Thing),
+            ("on", Use::Harmless),
+            ("the", Use::Harmless),
+            ("table", Use::Thing),
+        ]),
+        ..Evidence::default()
+    };
+    event.answer.mentioned = Some(Symbol::new("DiningTable"));
+    event.answer.chosen = vec![chosen(&[Some("Mug 2")]), chosen(&[Some("Mug 2"), None])];
+    event
+}
+
+fn forbidden() -> Interpreted {
+    let mut event = interpreted(Outcome::NotSure);
+    event.utterance = utterance("do not pick up the apple");
+    event.answer.evidence = Evidence {
+        lifted: vec![LiftedUtterance::parse("do not pick up the <obj>")],
+        threshold: 0.5,
+        mood: Some(Mood::Forbidden { word: "not".to_owned() }),
+        ..Evidence::default()
+    };
+    event
+}
+
+fn left_over() -> Interpreted {
+    let mut event = interpreted(Outcome::NotSure);
+    event.utterance = utterance("pick up the banana next to the apple");
+    event.answer.evidence = Evidence {
+        lifted: vec![LiftedUtterance::parse("pick up the banana next to the <obj>")],
+        threshold: 0.5,
+        accounting: accounting(&[
+            ("pick", Use::Verb),
+            ("up", Use::Verb),
+            ("the", Use::Harmless),
+            ("banana", Use::Nothing),
+            ("next", Use::Harmless),
+            ("to", Use::Harmless),
+            ("the", Use::Harmless),
+            ("apple", Use::Landmark),
+        ]),
+        ..Evidence::default()
+    };
+    event
+}
+
+fn accounting(words: &[(&str, Use)]) -> Vec<Accounted> {
+    let accounted = |&(word, used): &(&str, Use)| Accounted { word: word.to_owned(), used };
+    words.iter().map(accounted).collect()
 }
 
 fn episode_ended(ending: Ending) -> EpisodeEnded {

@@ -12,7 +12,7 @@ use apprentice::language::{
 use apprentice::learning::Recipe;
 use apprentice::service::{Config, Data};
 use apprentice::world::{
-    Domain, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
+    Domain, Edition, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
 };
 
 /// Bells ring until they are muted. Break one and the world panics, which is for tests of what the
@@ -145,7 +145,7 @@ impl Domain for Bells {
     fn signature(&self) -> &Signature {
         &self.signature
     }
-    fn lexicon(&self) -> &Lexicon {
+    fn lexicon(&self, _: Edition) -> &Lexicon {
         &self.lexicon
     }
     fn seeds(&self) -> &SeedSet {
@@ -185,7 +185,7 @@ impl Domain for Bells {
             true => Ok(vec![bell.to_string()]),
             false => {
                 let reason = format!("the {bell} bell is so already");
-                Err(Infeasible { reason, first: None })
+                Err(Infeasible::because(reason))
             }
         }
     }
@@ -197,7 +197,7 @@ impl Domain for Bells {
         let ring = |bell: &Symbol| Step { operator: "RING".into(), args: vec![bell.clone()] };
         Some(Program { steps: task.iter().map(ring).collect() })
     }
-    fn resolve(&self, _: &Ringing, mention: &Mention) -> Vec<Symbol> {
+    fn resolve(&self, _: Edition, _: &Ringing, mention: &Mention) -> Vec<Symbol> {
         mention.types.clone()
     }
     fn held(&self, _: &Ringing) -> Option<Symbol> {

@@ -1,5 +1,6 @@
 use serde_json::{Value, json};
 
+use crate::cli::transcript::passed_over;
 use crate::events::{Ending, Event, Overlap, Record, TenantEvent};
 use crate::ids::Timestamp;
 use crate::language::Outcome;
@@ -50,7 +51,10 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
         Event::Interpreted(event) => {
             let outcome = match &event.answer.outcome {
                 Outcome::Understood { program, .. } => format!("= {program}"),
-                Outcome::NotSure => "? not sure".to_owned(),
+                Outcome::NotSure => match passed_over(&event.answer.evidence) {
+                    Some(words) => format!("? not sure ({words})"),
+                    None => "? not sure".to_owned(),
+                },
                 Outcome::Impossible { program, step, reason } => {
                     format!("! impossible {program} step {} ({reason})", step + 1)
                 }

@@ -40,7 +40,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// The other configuration: another threshold (several make a sweep), a recipe that ships
-    /// (default, paper, grammar, seq2seq, seq2seq-grammar), or a recipe file.
+    /// (default, default-1, default-2, paper, …), or a recipe file.
     #[arg(long, value_name = "tau=T[..TO/STEP]|condition=NAME|recipe=FILE")]
     with: With,
     /// Only this lab's people.

@@ -86,8 +86,10 @@ pub struct Arguments {
     /// Stop at the first bad line of the corpus.
     #[arg(long, requires = "corpus")]
     strict: bool,
-    /// The simulated teacher: its parameters and its words (TOML), instead of the one that ships.
-    #[arg(long, value_name = "FILE")]
+    /// The simulated teacher: its parameters and its words. One that ships (teacher, or teacher-2,
+    /// who is polite, tells things apart and makes two requests at once) or a file (TOML)
+    /// [default: teacher]
+    #[arg(long, value_name = "NAME|FILE")]
     teacher: Option<PathBuf>,
     /// People who talk at the same time; the tables do not depend on it.
     #[arg(long, value_name = "COUNT", default_value_t = 8,
@@ -227,6 +229,9 @@ fn teacher(arguments: &Arguments) -> Result<Teacher, Failure> {
     let Some(path) = &arguments.teacher else {
         return Teacher::parse(Teacher::TEXT).map_err(Failure::failed);
     };
+    if let Some(text) = path.to_str().and_then(Teacher::builtin) {
+        return Teacher::parse(text).map_err(Failure::failed);
+    }
     let fail = |reason: String| {
         Failure::bad_input(format!("the teacher {} cannot be used: {reason}", path.display()))
     };

@@ -1,6 +1,6 @@
 //! What the conversation shows, as text. Pure: every function here only builds strings.
 
-use crate::language::{Answer, Answerer, Evidence, Near, Outcome, Program};
+use crate::language::{Accounted, Answer, Answerer, Evidence, Mood, Near, Outcome, Program, Use};
 use crate::session::{ActionView, KnownExemplar, Phase, Status, Teachable};
 use crate::world::View;
 
@@ -50,6 +50,15 @@ fn impossible(program: &Program, step: u32, reason: &str) -> String {
 }
 
 fn not_sure(evidence: &Evidence) -> String {
+    if let Some(mood) = &evidence.mood {
+        return no_request(mood);
+    }
+    let left_over = unique(evidence.left_over());
+    if let [words @ .., _] = &left_over[..] {
+        let are = if words.is_empty() { "is" } else { "are" };
+        let words = quoted(&left_over);
+        return format!("{NOT_SURE} I do not know what {words} {are} for here, so I did nothing.");
+    }
     match evidence.nearest.first() {
         // Near enough, and still no program: a slot of it had no mention to fill it.
         Some(near) if near.distance <= evidence.threshold => format!(
@@ -62,6 +71,31 @@ fn not_sure(evidence: &Evidence) -> String {
             near.exemplar, near.distance, evidence.threshold
         ),
         None => NOT_SURE.to_owned(),
+    }
+}
+
+/// What was said was no request: which word says so.
+fn no_request(mood: &Mood) -> String {
+    match mood {
+        Mood::Asked { word } => format!(
+            "I take that as a question (\"{word}\"), so I did nothing. I cannot answer questions yet."
+        ),
+        Mood::Told { word } => {
+            format!("I take that as telling me something (\"{word}\"), so I did nothing.")
+        }
+        Mood::Forbidden { word } => {
+            format!("I take that as something not to be done (\"{word}\"), so I did nothing.")
+        }
+        Mood::Conditional { word } => {
+            format!("I cannot wait for something to happen (\"{word}\"), so I did nothing.")
+        }
+        Mood::Later { word } => {
+            format!("I can only do things now (\"{word}\"), so I did nothing.")
+        }
+        Mood::Reordered { word } => format!(
+            "I do things in the order in which you say them (\"{word}\"): say what comes first, \
+             first. I did nothing."
+        ),
     }
 }
 
@@ -133,6 +167,11 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
             evidence.lifted.iter().map(|clause| format!("\"{clause}\"")).collect();
         lines.push(format!("I read it as {}.", clauses.join(" and ")));
     }
+    lines.extend(uses(&evidence.accounting));
+    let chosen = unique(answer.chosen.iter().flatten().flatten().map(String::as_str));
+    if !chosen.is_empty() {
+        lines.push(format!("Your words chose {}.", listed(&chosen)));
+    }
     let mut answered: Vec<Answerer> = evidence.answered_by.clone();
     answered.dedup();
     for answerer in &answered {
@@ -144,7 +183,7 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
             evidence.threshold
         ));
         lines.extend(evidence.nearest.iter().map(|near| nearest(near, evidence.threshold)));
-    } else if answered.is_empty() {
+    } else if answered.is_empty() && evidence.mood.is_none() {
         lines.push("I know nothing to compare it with.".to_owned());
     }
     for discarded in &evidence.discarded {
@@ -162,9 +201,86 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
         Outcome::Impossible { program, step, .. } => {
             format!("So I took it to mean {program}, but step {} cannot be done here.", step + 1)
         }
-        Outcome::NotSure => "So I was not sure, and did nothing.".to_owned(),
+        Outcome::NotSure => match &evidence.mood {
+            Some(mood) => no_request(mood),
+            None => "So I was not sure, and did nothing.".to_owned(),
+        },
     });
     lines
+}
+
+/// `Of your words I used "pick up" for what to do, "mug" for a thing, and nothing for "banana".`
+///
+/// - returns: none where words are not accounted for.
+fn uses(accounting: &[Accounted]) -> Option<String> {
+    let of = |used: Use| {
+        let words = accounting.iter().filter(|word| word.used == used);
+        let words = unique(words.map(|word| word.word.as_str()));
+        (!words.is_empty()).then(|| (quoted(&words), words.len()))
+    };
+    let group = |used: Use| {
+        let (words, count) = of(used)?;
+        let what = match used {
+            Use::Verb => "for what to do",
+            Use::Thing if count == 1 => "for a thing",
+            Use::Thing => "for things",
+            Use::Attribute => "for which one",
+            Use::Landmark => "for where it is",
+            Use::Frame => "as courtesy",
+            Use::Harmless => "as small words",
+            Use::Nothing => return Some(format!("nothing for {words}")),
+        };
+        Some(format!("{words} {what}"))
+    };
+    let groups = [
+        Use::Verb,
+        Use::Thing,
+        Use::Attribute,
+        Use::Landmark,
+        Use::Frame,
+        Use::Harmless,
+        Use::Nothing,
+    ];
+    let groups: Vec<String> = groups.into_iter().filter_map(group).collect();
+    match &groups[..] {
+        [] => None,
+        [one] => Some(format!("Of your words I used {one}.")),
+        // The groups hold an "and" of their own.
+        [first @ .., last] => {
+            Some(format!("Of your words I used {}, and {last}.", first.join(", ")))
+        }
+    }
+}
+
+/// The same words without repetitions, each where it stood first.
+fn unique<'w>(words: impl Iterator<Item = &'w str>) -> Vec<&'w str> {
+    let mut found: Vec<&str> = Vec::new();
+    for word in words {
+        if !found.contains(&word) {
+            found.push(word);
+        }
+    }
+    found
+}
+
+/// `"a", "b" and "c"`.
+fn quoted(words: &[&str]) -> String {
+    let words: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
+    listed(&words)
+}
+
+/// `a, b and c`.
+fn listed<S: AsRef<str>>(parts: &[S]) -> String {
+    let mut out = String::new();
+    for (index, part) in parts.iter().enumerate() {
+        out.push_str(match index {
+            0 => "",
+            _ if index + 1 == parts.len() => " and ",
+            _ => ", ",
+        });
+        out.push_str(part.as_ref());
+    }
+    out
 }
 
 fn nearest(near: &Near, threshold: f32) -> String {
@@ -365,12 +481,12 @@ mod tests {
                 reason: "the hand is full.".into(),
             }],
             reranked: 2,
-            answered_by: Vec::new(),
+            ..Evidence::default()
         }
     }
 
     fn answered(outcome: Outcome) -> Answer {
-        Answer { outcome, evidence: evidence(), mentioned: None }
+        Answer { outcome, evidence: evidence(), mentioned: None, chosen: Vec::new() }
     }
 
     #[test]
@@ -397,6 +513,114 @@ mod tests {
         told.evidence.nearest[0].distance = 0.2;
         let lines = answer(&told, &[]);
         assert!(lines[0].ends_with("and not all that it needs was named."), "{lines:?}");
+    }
+
+    fn accounting(words: &[(&str, Use)]) -> Vec<Accounted> {
+        let accounted = |&(word, used): &(&str, Use)| Accounted { word: word.to_owned(), used };
+        words.iter().map(accounted).collect()
+    }
+
+    #[test]
+    fn what_is_no_request_is_told_by_the_word_that_says_so() {
+        let word = |word: &str| word.to_owned();
+        for (mood, sentence) in [
+            (
+                Mood::Asked { word: word("did") },
+                "I take that as a question (\"did\"), so I did nothing. I cannot answer questions \
+                 yet.",
+            ),
+            (
+                Mood::Told { word: word("i") },
+                "I take that as telling me something (\"i\"), so I did nothing.",
+            ),
+            (
+                Mood::Forbidden { word: word("not") },
+                "I take that as something not to be done (\"not\"), so I did nothing.",
+            ),
+            (
+                Mood::Conditional { word: word("until") },
+                "I cannot wait for something to happen (\"until\"), so I did nothing.",
+            ),
+            (
+                Mood::Later { word: word("tomorrow") },
+                "I can only do things now (\"tomorrow\"), so I did nothing.",
+            ),
+            (
+                Mood::Reordered { word: word("before") },
+                "I do things in the order in which you say them (\"before\"): say what comes \
+                 first, first. I did nothing.",
+            ),
+        ] {
+            let mut told = answered(Outcome::NotSure);
+            told.evidence.nearest.clear();
+            told.evidence.mood = Some(mood);
+            assert_eq!(answer(&told, &[]), [sentence]);
+            let lines = why("did you wash it?", &told);
+            assert_eq!(lines.last().map(String::as_str), Some(sentence));
+            assert!(!lines.join("\n").contains("nothing to compare"), "{lines:?}");
+        }
+    }
+
+    #[test]
+    fn words_that_were_used_for_nothing_are_named() {
+        let mut told = answered(Outcome::NotSure);
+        let mut sentence = |words: &[(&str, Use)]| {
+            told.evidence.accounting = accounting(words);
+            answer(&told, &[]).remove(0)
+        };
+        let (banana, kiwi, fig) =
+            (("banana", Use::Nothing), ("kiwi", Use::Nothing), ("fig", Use::Nothing));
+        assert_eq!(
+            sentence(&[("get", Use::Verb), banana, ("the", Use::Harmless), banana]),
+            "I'm sorry - I don't understand! I do not know what \"banana\" is for here, so I did \
+             nothing."
+        );
+        assert_eq!(
+            sentence(&[banana, kiwi, fig]),
+            "I'm sorry - I don't understand! I do not know what \"banana\", \"kiwi\" and \"fig\" \
+             are for here, so I did nothing."
+        );
+        // Every word was used: what is nearest says more.
+        assert!(sentence(&[("get", Use::Verb)]).contains("The nearest thing I know is"));
+    }
+
+    #[test]
+    fn why_lists_what_each_word_was_used_for() {
+        let mut told = answered(Outcome::NotSure);
+        let text = |told: &Answer| why("please pick up the mug", told).join("\n");
+        assert!(!text(&told).contains("Of your words"), "{}", text(&told));
+        told.evidence.accounting = accounting(&[
+            ("please", Use::Frame),
+            ("pick up", Use::Verb),
+            ("the", Use::Harmless),
+            ("dirty", Use::Attribute),
+            ("mug", Use::Thing),
+            ("and", Use::Harmless),
+            ("the", Use::Harmless),
+            ("plate", Use::Thing),
+            ("table", Use::Landmark),
+            ("banana", Use::Nothing),
+        ]);
+        let line = "Of your words I used \"pick up\" for what to do, \"mug\" and \"plate\" for \
+                    things, \"dirty\" for which one, \"table\" for where it is, \"please\" as \
+                    courtesy, \"the\" and \"and\" as small words, and nothing for \"banana\".";
+        assert!(text(&told).contains(line), "{}", text(&told));
+        told.evidence.accounting = accounting(&[("open", Use::Verb), ("fridge", Use::Thing)]);
+        let line = "Of your words I used \"open\" for what to do, and \"fridge\" for a thing.\n";
+        assert!(text(&told).contains(line), "{}", text(&told));
+    }
+
+    #[test]
+    fn why_names_the_things_that_words_chose_once_each() {
+        let program = "GOTO Mug; PUT Mug Table".parse().unwrap();
+        let mut told = answered(Outcome::Understood { program, bindings: vec![] });
+        let text = |told: &Answer| why("put the other mug there", told).join("\n");
+        assert!(!text(&told).contains("Your words chose"), "{}", text(&told));
+        let mug = Some("Mug 2".to_owned());
+        told.chosen = vec![vec![mug.clone()], vec![mug, None]];
+        assert!(text(&told).contains("\nYour words chose Mug 2.\n"), "{}", text(&told));
+        told.chosen[1][1] = Some("Table 3".to_owned());
+        assert!(text(&told).contains("Your words chose Mug 2 and Table 3."), "{}", text(&told));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 use similar::TextDiff;
 
-use super::line::{Act, Answer, Kind, Transcript};
 use super::play::{Played, RealAct};
+use crate::study::transcript::{Act, Answer, Kind, Transcript};
 
 /// Lines of context around each difference.
 const CONTEXT_LINES: usize = 3;

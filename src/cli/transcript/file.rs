@@ -1,14 +1,11 @@
 use std::path::{Path, PathBuf};
 
-use super::line::Transcript;
 use super::play::{PlayError, Player};
 use crate::cli::failure::Failure;
 use crate::cli::recipe;
 use crate::frontends::Client;
 use crate::ids::UserId;
-
-/// Bytes of a transcript file. A story of five hundred utterances has under 100 kB.
-const FILE_BYTES_MAX: u64 = 4 * 1024 * 1024;
+use crate::study::transcript::{FILE_BYTES_MAX, Transcript};
 
 /// A transcript with its place, which other files are named relative to.
 #[derive(Debug, Clone, PartialEq)]

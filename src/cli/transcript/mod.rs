@@ -3,8 +3,6 @@
 
 mod compare;
 mod file;
-mod line;
-mod parse;
 mod play;
 
 use std::collections::BTreeMap;
@@ -98,6 +96,11 @@ impl Services {
 /// What came of an utterance, as a line of a transcript.
 pub(super) fn show_answer(outcome: &Outcome, evidence: &Evidence, actions_before: u32) -> String {
     play::show(outcome, evidence, actions_before).1
+}
+
+/// Which words make an utterance no request, or were used for nothing: `a question: "did"`.
+pub(super) fn passed_over(evidence: &Evidence) -> Option<String> {
+    play::passed_over(evidence)
 }
 
 fn write(text: &str) -> Result<(), Failure> {

@@ -1,14 +1,14 @@
 use std::path::Path;
 use std::time::Duration;
 
-use super::line::{Act, Answer, Kind, Line, Setting, Transcript};
 use crate::cli::terminal::count;
 use crate::events::Ending;
 use crate::frontends::{Client, ClientError};
 use crate::ids::Seq;
-use crate::language::{Evidence, Outcome};
+use crate::language::{Evidence, Mood, Outcome};
 use crate::limits::SCENE_FILE_BYTES_MAX;
 use crate::session::{RejectionCode, Reply, Told};
+use crate::study::transcript::{Act, Answer, Kind, Line, Setting, Transcript};
 use crate::world::Stage;
 
 /// How long one training may take.
@@ -94,7 +94,7 @@ impl<'a> Player<'a> {
             match &line.kind {
                 Kind::Setting(setting) => self.set(setting, line.number)?,
                 Kind::Act(act) => played.push((index, self.act(act, line)?)),
-                Kind::Remark | Kind::Answer(_) => {}
+                Kind::Remark | Kind::Answer(_) | Kind::Meant(_) => {}
             }
         }
         Ok(played)
@@ -309,19 +309,90 @@ pub(super) fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answ
             (Answer::Impossible(Some((program.clone(), step))), text)
         }
         Outcome::NotSure => {
-            let text = match evidence.nearest.first() {
-                Some(near) if near.distance > evidence.threshold => format!(
-                    "? not sure (nearest \"{}\", {:.2} > {:.2})",
-                    near.exemplar, near.distance, evidence.threshold
-                ),
-                // Near enough, and still no program: a slot of it had no mention to fill it.
-                Some(near) => format!(
-                    "? not sure (nearest \"{}\", but not all it needs was named)",
-                    near.exemplar
-                ),
+            let remark = passed_over(evidence).or_else(|| nearest(evidence));
+            let text = match remark {
+                Some(remark) => format!("? not sure ({remark})"),
                 None => "? not sure".to_owned(),
             };
             (Answer::NotSure, text)
+        }
+    }
+}
+
+/// Which words make an utterance no request, or were used for nothing: `a question: "did"`.
+pub(super) fn passed_over(evidence: &Evidence) -> Option<String> {
+    if let Some(mood) = &evidence.mood {
+        let (what, word) = match mood {
+            Mood::Asked { word } => ("a question", word),
+            Mood::Told { word } => ("a statement", word),
+            Mood::Forbidden { word } => ("forbidden", word),
+            Mood::Conditional { word } => ("a condition", word),
+            Mood::Later { word } => ("not now", word),
+            Mood::Reordered { word } => ("another order", word),
+        };
+        return Some(format!("{what}: \"{word}\""));
+    }
+    let words: Vec<String> = evidence.left_over().map(|word| format!("\"{word}\"")).collect();
+    (!words.is_empty()).then(|| format!("nothing for {}", words.join(", ")))
+}
+
+fn nearest(evidence: &Evidence) -> Option<String> {
+    let near = evidence.nearest.first()?;
+    Some(match near.distance > evidence.threshold {
+        true => format!(
+            "nearest \"{}\", {:.2} > {:.2}",
+            near.exemplar, near.distance, evidence.threshold
+        ),
+        // Near enough, and still no program: a slot of it had no mention to fill it.
+        false => format!("nearest \"{}\", but not all it needs was named", near.exemplar),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::{Accounted, LiftedUtterance, Near, Use};
+
+    #[test]
+    fn not_sure_says_why_in_a_few_words_that_a_transcript_reads_over() {
+        let shown = |evidence: &Evidence| {
+            let (answer, text) = show(&Outcome::NotSure, evidence, 0);
+            assert_eq!(answer, Answer::NotSure);
+            let written = format!("task free\n> did you wash the mug?\n{text}\n");
+            let read = Transcript::parse(&written).unwrap();
+            let answers =
+                read.lines.iter().filter(|line| line.kind == Kind::Answer(Answer::NotSure));
+            assert_eq!(answers.count(), 1, "{text}");
+            text
+        };
+        let near = |distance| Near {
+            exemplar: LiftedUtterance::parse("open the <obj>"),
+            program: "OPEN <obj:1>".parse().unwrap(),
+            distance,
+            number: 3,
+        };
+        let mut evidence = Evidence { threshold: 0.5, ..Evidence::default() };
+        assert_eq!(shown(&evidence), "? not sure");
+        evidence.nearest = vec![near(0.75)];
+        assert_eq!(shown(&evidence), "? not sure (nearest \"open the <obj>\", 0.75 > 0.50)");
+        evidence.nearest = vec![near(0.25)];
+        let text = shown(&evidence);
+        assert!(text.ends_with("\"open the <obj>\", but not all it needs was named)"), "{text}");
+        let used = |word: &str, used| Accounted { word: word.to_owned(), used };
+        evidence.accounting = vec![used("open", Use::Verb), used("banana", Use::Nothing)];
+        assert_eq!(shown(&evidence), "? not sure (nothing for \"banana\")");
+        evidence.accounting.push(used("kiwi", Use::Nothing));
+        assert_eq!(shown(&evidence), "? not sure (nothing for \"banana\", \"kiwi\")");
+        for (mood, wanted) in [
+            (Mood::Asked { word: "did".into() }, "a question: \"did\""),
+            (Mood::Told { word: "i".into() }, "a statement: \"i\""),
+            (Mood::Forbidden { word: "not".into() }, "forbidden: \"not\""),
+            (Mood::Conditional { word: "until".into() }, "a condition: \"until\""),
+            (Mood::Later { word: "tomorrow".into() }, "not now: \"tomorrow\""),
+            (Mood::Reordered { word: "before".into() }, "another order: \"before\""),
+        ] {
+            evidence.mood = Some(mood);
+            assert_eq!(shown(&evidence), format!("? not sure ({wanted})"));
         }
     }
 }

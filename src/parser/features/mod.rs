@@ -199,7 +199,19 @@ impl FeaturesParser {
 
     /// The exemplars of this lifted form, determiners aside, oldest first.
     pub fn exact(&self, lifted: &LiftedUtterance) -> &[u32] {
-        self.by_form.get(&form(&self.knowledge, lifted)).map_or(&[], Vec::as_slice)
+        let mut form = form(&self.knowledge, lifted);
+        let known = self.by_form.get(&form).map_or(&[][..], Vec::as_slice);
+        if !known.is_empty() || !self.settings.seeds_of_any_fixture {
+            return known;
+        }
+        for word in &mut form {
+            if let Word::Slot { fixture, .. } = word {
+                *fixture = None;
+            }
+        }
+        let known = self.by_form.get(&form).map_or(&[][..], Vec::as_slice);
+        let seeds = known.iter().take_while(|number| (**number as usize) < self.seeds).count();
+        &known[..seeds]
     }
 
     fn judge(&self, clause: &Clause, sentence: &Sentence) -> Vec<Judged> {

@@ -19,6 +19,9 @@ pub struct FeaturesSettings {
     /// Release 0.1 did not have it, and its recipes keep their digest without it.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub unread: f32,
+    /// The seeds' own words are theirs whatever fixture is named: "turn off the microwave".
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub seeds_of_any_fixture: bool,
     pub primitive: PrimitiveWeights,
     pub lesson: LessonSettings,
 }

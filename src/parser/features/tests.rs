@@ -32,7 +32,7 @@ struct World {
 
 impl World {
     fn new() -> World {
-        let text = include_str!("../../../data/recipes/default.toml");
+        let text = include_str!("../../../data/recipes/default-1.toml");
         let recipe: toml::Table = toml::from_str(text).unwrap();
         let lists = recipe["abstraction"]["lists"].clone();
         let settings = recipe["parser"]["features"].clone();

@@ -225,9 +225,10 @@ impl<'a> Reader<'a> {
             if matches!(event.answer.outcome, Outcome::Understood { .. }) {
                 outcome = "understood";
                 primitives = program.steps.len() as u32;
-                for step in &program.steps {
+                for (index, step) in program.steps.iter().enumerate() {
+                    let on = event.answer.chosen_for(index);
                     self.household
-                        .step(&mut present.scene, &present.task, step)
+                        .step_on(&mut present.scene, &present.task, step, on)
                         .map_err(|error| format!("record {seq} did {step}, but {error}"))?;
                 }
                 right = Some(carried_out_as_meant(

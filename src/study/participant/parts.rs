@@ -18,6 +18,8 @@ pub struct Unit {
     pub steps: Vec<Step>,
     /// What it is broken into when it is not understood; empty for a primitive.
     pub parts: Vec<Unit>,
+    /// Its two parts are asked for in one utterance, each in its own words.
+    pub joined: bool,
 }
 
 /// The whole task, in its parts.
@@ -39,6 +41,7 @@ pub fn whole(task: &str, plan: &[Step]) -> Option<Unit> {
         carrier,
         steps: plan.to_vec(),
         parts: parts(form, plan),
+        joined: false,
     })
 }
 
@@ -100,7 +103,35 @@ pub fn parts(form: &str, plan: &[Step]) -> Vec<Unit> {
 
 fn part(key: Option<&'static str>, thing: Symbol, place: Option<Symbol>, steps: &[Step]) -> Unit {
     let parts = steps.iter().map(primitive).collect();
-    Unit { size: Size::Part, key, thing, place, carrier: None, steps: steps.to_vec(), parts }
+    let steps = steps.to_vec();
+    Unit { size: Size::Part, key, thing, place, carrier: None, steps, parts, joined: false }
+}
+
+/// Two requests at once; none where one has no words or both would say the same of a switch.
+///
+/// - `rest`: the plan after the first.
+pub fn joined(form: &str, first: &Unit, rest: &[Step]) -> Option<Unit> {
+    let next = parts(form, rest).into_iter().next()?;
+    let second = match first.size {
+        Size::Primitive => primitives(&next.steps, || false).into_iter().next()?,
+        Size::Part => next,
+        Size::Whole => return None,
+    };
+    // Words for a switch depend on its state, which the first request may change.
+    let switches = |unit: &Unit| unit.key == Some("on");
+    if first.key.is_none() || second.key.is_none() || switches(first) || switches(&second) {
+        return None;
+    }
+    Some(Unit {
+        size: Size::Part,
+        key: None,
+        thing: first.thing.clone(),
+        place: None,
+        carrier: None,
+        steps: [&first.steps[..], &second.steps[..]].concat(),
+        parts: vec![first.clone(), second],
+        joined: true,
+    })
 }
 
 /// One primitive.
@@ -122,6 +153,7 @@ pub fn primitive(step: &Step) -> Unit {
         carrier: None,
         steps: vec![step.clone()],
         parts: Vec::new(),
+        joined: false,
     }
 }
 
@@ -186,6 +218,27 @@ mod tests {
             cut("look", "GOTO Book; PICKUP Book; GOTO DeskLamp; TOGGLE DeskLamp"),
             ["fetch Book: GOTO Book; PICKUP Book", "light Book: GOTO DeskLamp; TOGGLE DeskLamp"]
         );
+    }
+
+    #[test]
+    fn two_requests_are_made_at_once_in_the_order_of_the_plan() {
+        let plan: Program =
+            "GOTO Mug; PICKUP Mug; GOTO Shelf; PUT Mug Shelf; TOGGLE Lamp".parse().unwrap();
+        let check = |first: usize, size: Size, rest: usize, expected: Option<&str>| {
+            let unit = match size {
+                Size::Primitive => primitive(&plan.steps[first]),
+                _ => parts("place", &plan.steps).swap_remove(first),
+            };
+            let both = joined("place", &unit, &plan.steps[rest..]);
+            let said = both.map(|both| Program { steps: both.steps }.to_string());
+            assert_eq!(said.as_deref(), expected);
+        };
+        check(0, Size::Primitive, 1, Some("GOTO Mug; PICKUP Mug"));
+        check(0, Size::Part, 2, Some("GOTO Mug; PICKUP Mug; GOTO Shelf; PUT Mug Shelf"));
+        // What is left has no words as a part, and a switch none for later.
+        check(1, Size::Part, 4, None);
+        check(3, Size::Primitive, 4, None);
+        check(4, Size::Primitive, 5, None);
     }
 
     #[test]

@@ -5,14 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{Unit, parts, primitives, whole};
+use super::parts::{Unit, joined, parts, primitives, whole};
 use super::talk::{Heard, Talk, TalkError, Turn, Wire};
-use super::teacher::{Share, Size, Teacher};
-use super::wording::{Names, Shunned, Words, chance, say, say_plainly};
+use super::teacher::{Manner, Share, Size, Teacher};
+use super::wording::{Apart, Names, Shunned, Words, chance, say, say_plainly};
 use crate::language::{Program, Step, Symbol};
 use crate::numerics::Rng;
 use crate::study::draw;
-use crate::world::household::Household;
+use crate::study::transcript::Request;
+use crate::world::household::{Household, Kind};
 use crate::world::{Domain, Stage, Thing};
 
 /// Plans made in one episode before it is given up.
@@ -29,11 +30,16 @@ pub struct Person {
     habits: BTreeMap<String, String>,
 }
 
+/// Of each type, the thing that is meant, by its name.
+type About = BTreeMap<Symbol, String>;
+
 /// What is remembered with something said: the habit that teaching it makes.
 struct Note {
     size: Size,
     habit: String,
     wording: String,
+    /// Two requests at once, which nobody teaches.
+    joined: bool,
 }
 
 /// How a request ended.
@@ -96,11 +102,15 @@ pub fn teach(
         rng: rng("speaking"),
         shunned: Shunned::new(),
         failed: BTreeSet::new(),
+        handled: BTreeMap::new(),
     };
     speaker.pursue()?;
     let talk = speaker.talk;
     let (teacher, mut rng) = (episode.teacher, rng("teaching"));
     let (taught, turns) = talk.end(|note: &Note| {
+        if note.joined {
+            return false;
+        }
         let effort = match note.size {
             Size::Primitive => teacher.effort_primitives,
             Size::Part | Size::Whole => teacher.effort,
@@ -123,6 +133,8 @@ struct Speaker<'a> {
     shunned: Shunned,
     /// Habits with wordings that did not work in this episode.
     failed: BTreeSet<(String, String)>,
+    /// Of each type, the thing that a request was last about.
+    handled: BTreeMap<Symbol, String>,
 }
 
 impl Speaker<'_> {
@@ -142,6 +154,10 @@ impl Speaker<'_> {
                 }
             }
             let (unit, again) = self.choose(form, &rest, careful);
+            let unit = match careful {
+                true => unit,
+                false => self.perhaps_two(form, unit, &rest),
+            };
             let (count, expected) = (unit.steps.len(), self.talk.aim(&unit.steps));
             let first = !careful;
             careful = match self.request(&unit, first)? {
@@ -188,6 +204,15 @@ impl Speaker<'_> {
         (units.swap_remove(0), more)
     }
 
+    /// The request, perhaps with the next one of the plan.
+    fn perhaps_two(&mut self, form: &str, unit: Unit, rest: &[Step]) -> Unit {
+        let Some(manner) = &self.episode.teacher.manner else { return unit };
+        match chance(&mut self.rng, manner.two_at_once) {
+            true => joined(form, &unit, &rest[unit.steps.len()..]).unwrap_or(unit),
+            false => unit,
+        }
+    }
+
     /// Whether a wording that worked before comes to mind and is trusted.
     fn remembers(&mut self, habit: &str, trust: Share) -> bool {
         let forgotten = chance(&mut self.rng, self.episode.teacher.forgetfulness);
@@ -199,7 +224,7 @@ impl Speaker<'_> {
     fn request(&mut self, unit: &Unit, first: bool) -> Result<Asked, TalkError> {
         let tries = match unit.parts.is_empty() {
             true => self.episode.teacher.attempts,
-            false => usize::from(unit.key.is_some()),
+            false => usize::from(unit.key.is_some() || unit.joined),
         };
         for attempt in 0..tries {
             let Some(aim) = self.talk.aim(&unit.steps) else { return Ok(Asked::Wrong) };
@@ -210,7 +235,8 @@ impl Speaker<'_> {
                 return Ok(Asked::Lost);
             }
             let last = tries > 1 && attempt + 1 == tries;
-            let (words, note) = self.words(unit, attempt, last);
+            let about = self.about(&aim.program);
+            let (words, note) = self.words(unit, &about, attempt, last);
             let (habit, wording) = (note.habit.clone(), note.wording.clone());
             let heard = self.talk.say(&words.text, &aim.program, first && attempt == 0, note)?;
             let teacher = self.episode.teacher;
@@ -219,7 +245,10 @@ impl Speaker<'_> {
                     if unit.size != Size::Primitive {
                         self.person.gain(teacher.trust_gain);
                     }
-                    self.person.habits.insert(habit, wording);
+                    if !unit.joined {
+                        self.person.habits.insert(habit, wording);
+                    }
+                    self.handled.extend(about);
                     return Ok(Asked::Settled);
                 }
                 Heard::Wrong => {
@@ -267,7 +296,96 @@ impl Speaker<'_> {
         self.shunned.len() > before
     }
 
-    fn words(&mut self, unit: &Unit, attempt: usize, last: bool) -> (Words, Note) {
+    /// The words for a request as this teacher puts them; the plainest ones stand alone.
+    ///
+    /// - `about`: the things that are meant.
+    fn words(&mut self, unit: &Unit, about: &About, attempt: usize, last: bool) -> (Words, Note) {
+        let Some(manner) = &self.episode.teacher.manner else {
+            return self.bare_words(unit, &Apart::new(), attempt, last);
+        };
+        let (mut words, note) = match (unit.joined, &unit.parts[..]) {
+            (true, [first, second]) => self.two_at_once(manner, about, [first, second]),
+            _ => {
+                let apart = self.told_apart(manner, unit, about);
+                self.bare_words(unit, &apart, attempt, last)
+            }
+        };
+        if !last && chance(&mut self.rng, manner.framed) {
+            let frame = &manner.frames[self.rng.below(manner.frames.len())];
+            words.text = frame.replace("{request}", &words.text);
+        }
+        (words, note)
+    }
+
+    fn two_at_once(&mut self, manner: &Manner, about: &About, units: [&Unit; 2]) -> (Words, Note) {
+        let [first, second] = units.map(|unit| {
+            let apart = self.told_apart(manner, unit, about);
+            self.bare_words(unit, &apart, 0, false).0
+        });
+        let join = &manner.joins[self.rng.below(manner.joins.len())];
+        let text = join.replace("{first}", &first.text).replace("{second}", &second.text);
+        let names = [first.names, second.names].concat();
+        let (habit, wording) = ("two at once".to_owned(), join.clone());
+        (Words { text, names }, Note { size: Size::Part, habit, wording, joined: true })
+    }
+
+    /// The thing of each type that a program is about: the first where it is about several.
+    fn about(&self, program: &Program) -> About {
+        let mut scene = self.talk.scene().clone();
+        let mut about = About::new();
+        for step in &program.steps {
+            let done = self.episode.household.step(&mut scene, self.talk.task(), step);
+            let Ok(names) = done else { break };
+            for (kind, name) in step.args.iter().zip(names) {
+                about.entry(kind.clone()).or_insert(name);
+            }
+        }
+        about
+    }
+
+    /// Words for those things of a request that are one of several: by number, as the other of two,
+    /// or by where they are.
+    fn told_apart(&mut self, manner: &Manner, unit: &Unit, about: &About) -> Apart {
+        let mut apart = Apart::new();
+        // The whole task is about any of its things.
+        if unit.size == Size::Whole {
+            return apart;
+        }
+        let view = self.episode.household.look(self.talk.scene());
+        for kind in [Some(&unit.thing), unit.place.as_ref()].into_iter().flatten() {
+            let alike: Vec<&Thing> = view.things.iter().filter(|t| t.kind == *kind).collect();
+            let Some(name) = about.get(kind).filter(|_| alike.len() > 1) else { continue };
+            if !chance(&mut self.rng, manner.told_apart) {
+                continue;
+            }
+            let number = name.rsplit(' ').next().unwrap_or_default();
+            let mut forms: Vec<String> =
+                manner.numbered.iter().map(|form| form.replace("{number}", number)).collect();
+            if alike.len() == 2 && self.handled.get(kind).is_some_and(|last| last != name) {
+                forms.extend(manner.other.iter().cloned());
+            }
+            // "The mug on the table on the shelf" would say two places.
+            let place = if unit.place.is_none() { own_place(&alike, name) } else { None };
+            if let Some(place) = place {
+                let inside = Kind::named(place.as_str()).is_some_and(Kind::inside);
+                let said = self.names.plain(&place, &self.shunned);
+                let prep = if inside { "in" } else { "on" };
+                let placed = |form: &String| form.replace("{prep}", prep).replace("{place}", &said);
+                forms.extend(manner.placed.iter().map(placed));
+            }
+            let form = forms.swap_remove(self.rng.below(forms.len()));
+            apart.insert(kind.clone(), form);
+        }
+        apart
+    }
+
+    fn bare_words(
+        &mut self,
+        unit: &Unit,
+        apart: &Apart,
+        attempt: usize,
+        last: bool,
+    ) -> (Words, Note) {
         let key = match unit.key {
             Some("on") => self.switch(unit),
             Some(key) => key,
@@ -297,9 +415,9 @@ impl Speaker<'_> {
         };
         let words = match last {
             true => say_plainly(&self.names, &self.shunned, &wording, unit),
-            false => say(&self.names, &self.shunned, teacher, &wording, unit, &mut self.rng),
+            false => say(&self.names, &self.shunned, teacher, &wording, unit, apart, &mut self.rng),
         };
-        (words, Note { size: unit.size, habit, wording })
+        (words, Note { size: unit.size, habit, wording, joined: false })
     }
 
     /// Whether what is to be switched is off now.
@@ -309,6 +427,14 @@ impl Speaker<'_> {
         let is_on = view.things.iter().any(|thing| thing.kind == unit.thing && on(thing));
         if is_on { "off" } else { "on" }
     }
+}
+
+/// The type of the place that only one of some things of a type is in or on.
+fn own_place(alike: &[&Thing], name: &str) -> Option<Symbol> {
+    let place = |thing: &Thing| thing.place.as_deref().map(Request::kind).map(Symbol::new);
+    let (own, others): (Vec<&Thing>, Vec<&Thing>) = alike.iter().partition(|t| t.name == name);
+    let own = own.first().and_then(|thing| place(thing))?;
+    others.iter().all(|other| place(other).as_ref() != Some(&own)).then_some(own)
 }
 
 fn habit_of(size: Size, key: &str) -> String {

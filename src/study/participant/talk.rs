@@ -209,8 +209,8 @@ impl<'a, T> Talk<'a, T> {
                     let before = self.scene.clone();
                     self.last_from = self.actions.len();
                     heard = match &answer.outcome {
-                        Outcome::Understood { program, .. } => {
-                            self.watch(program)?;
+                        Outcome::Understood { program, bindings } => {
+                            self.watch(program, bindings)?;
                             match carried_out_as_meant(
                                 self.household,
                                 &self.task,
@@ -241,10 +241,13 @@ impl<'a, T> Talk<'a, T> {
     }
 
     /// The robot does what it said it does, before the person's eyes.
-    fn watch(&mut self, program: &Program) -> Result<(), TalkError> {
-        for step in &program.steps {
+    fn watch(&mut self, program: &Program, bindings: &[Vec<String>]) -> Result<(), TalkError> {
+        for (place, step) in program.steps.iter().enumerate() {
+            // What it acted on is seen, too: words may have chosen another thing than the nearest.
+            let names = bindings.get(place).into_iter().flatten();
+            let on: Vec<Option<String>> = names.cloned().map(Some).collect();
             self.household
-                .step(&mut self.scene, &self.task, step)
+                .step_on(&mut self.scene, &self.task, step, &on)
                 .map_err(|error| TalkError::Puzzling(format!("it did {step}, but {error}")))?;
             self.actions.push(step.clone());
         }

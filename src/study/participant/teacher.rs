@@ -1,5 +1,5 @@
-//! The parameters and the words of a simulated teacher, read from `data/study/teacher.toml` or a
-//! file like it.
+//! The parameters and the words of a simulated teacher, read from `data/study/teacher.toml`,
+//! `teacher-2.toml`, or a file like them.
 
 use std::collections::BTreeMap;
 
@@ -28,8 +28,31 @@ pub struct Teacher {
     pub attempts: usize,
     /// Utterances of one episode before it is given up.
     pub utterances_max: usize,
+    /// How it speaks beside what it asks for; none of a teacher who says just that.
+    pub manner: Option<Manner>,
     wordings: BTreeMap<(Size, String), Vec<String>>,
     digest: Digest,
+}
+
+/// How a teacher speaks who does not say just what it wants. No list is empty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Manner {
+    /// How often a request stands in a frame.
+    pub framed: Share,
+    /// With `{request}`: "could you please {request}?".
+    pub frames: Vec<String>,
+    /// How often two requests are made at once.
+    pub two_at_once: Share,
+    /// With `{first}` and `{second}`.
+    pub joins: Vec<String>,
+    /// How often a thing of which there are several is told apart.
+    pub told_apart: Share,
+    /// With `{name}` and `{number}`: "mug 2".
+    pub numbered: Vec<String>,
+    /// With `{name}`: "the other mug", of two, after the one.
+    pub other: Vec<String>,
+    /// With `{prep}` and `{place}`, perhaps `{name}`: "the one on the table".
+    pub placed: Vec<String>,
 }
 
 /// A share in parts of ten thousand, so that trust is the same number on every machine and in every
@@ -76,12 +99,26 @@ struct File {
     typos: f64,
     attempts: usize,
     utterances_max: usize,
+    manner: Option<FileManner>,
     #[serde(rename = "primitives")]
     words_primitives: BTreeMap<String, Vec<String>>,
     #[serde(rename = "parts")]
     words_parts: BTreeMap<String, Vec<String>>,
     #[serde(rename = "whole_tasks")]
     words_whole: BTreeMap<String, Vec<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileManner {
+    framed: f64,
+    frames: Vec<String>,
+    two_at_once: f64,
+    joins: Vec<String>,
+    told_apart: f64,
+    numbered: Vec<String>,
+    other: Vec<String>,
+    placed: Vec<String>,
 }
 
 /// What every teacher has words for.
@@ -98,6 +135,17 @@ const ATTEMPTS_MAX: usize = 20;
 impl Teacher {
     /// The teacher that ships.
     pub const TEXT: &'static str = include_str!("../../../data/study/teacher.toml");
+    /// The names of the teachers that ship.
+    pub const BUILTIN: [&'static str; 2] = ["teacher", "teacher-2"];
+
+    /// The text of a teacher that ships.
+    pub fn builtin(name: &str) -> Option<&'static str> {
+        match name {
+            "teacher" => Some(Teacher::TEXT),
+            "teacher-2" => Some(include_str!("../../../data/study/teacher-2.toml")),
+            _ => None,
+        }
+    }
 
     /// - errors: no TOML, an unknown or missing field, a share above 1, a kind of request without
     ///   words, or a brace that means nothing.
@@ -120,6 +168,19 @@ impl Teacher {
                 return bad(format!("{name} is {value}; it is from 1 to {most}"));
             }
         }
+        let manner = file.manner.map(|manner| {
+            Ok::<Manner, TeacherError>(Manner {
+                framed: share("framed", manner.framed)?,
+                two_at_once: share("two_at_once", manner.two_at_once)?,
+                told_apart: share("told_apart", manner.told_apart)?,
+                frames: templates("frames", manner.frames, &["{request}"], &[])?,
+                joins: templates("joins", manner.joins, &["{first}", "{second}"], &[])?,
+                numbered: templates("numbered", manner.numbered, &["{name}", "{number}"], &[])?,
+                other: templates("other", manner.other, &["{name}"], &[])?,
+                placed: templates("placed", manner.placed, &["{prep}", "{place}"], &["{name}"])?,
+            })
+        });
+        let manner = manner.transpose()?;
         let mut wordings = BTreeMap::new();
         for (size, section, words, keys) in [
             (Size::Primitive, "primitives", file.words_primitives, &PRIMITIVES[..]),
@@ -148,6 +209,7 @@ impl Teacher {
             typos: share("typos", file.typos)?,
             attempts: file.attempts,
             utterances_max: file.utterances_max,
+            manner,
             wordings,
             digest: Digest::of(text.as_bytes()),
         })
@@ -163,6 +225,30 @@ impl Teacher {
     pub fn digest(&self) -> Digest {
         self.digest
     }
+}
+
+/// - errors: no template, one that lacks what it needs, or a brace that means nothing there.
+fn templates(
+    list: &str,
+    templates: Vec<String>,
+    needed: &[&str],
+    allowed: &[&str],
+) -> Result<Vec<String>, TeacherError> {
+    let bad = |what: String| Err(TeacherError(format!("{list} of [manner] {what}")));
+    if templates.is_empty() {
+        return bad("is empty".to_owned());
+    }
+    for template in &templates {
+        if let Some(missing) = needed.iter().find(|name| template.matches(**name).count() != 1) {
+            return bad(format!("has {template:?}, which needs {missing} once"));
+        }
+        let known = needed.iter().chain(allowed);
+        let rest = known.fold(template.clone(), |rest, name| rest.replace(name, ""));
+        if rest.contains(['{', '}']) {
+            return bad(format!("has {template:?} with a brace that means nothing there"));
+        }
+    }
+    Ok(templates)
 }
 
 fn check_words(
@@ -195,6 +281,32 @@ mod tests {
         let teacher = Teacher::parse(Teacher::TEXT).unwrap();
         assert_eq!(teacher.trust, Share(7_000));
         assert!(teacher.wordings(Size::Part, "cool").len() > 3);
+    }
+
+    #[test]
+    fn the_teachers_that_ship_have_their_manners() {
+        let read = |name: &str| Teacher::parse(Teacher::builtin(name).unwrap()).unwrap();
+        assert_eq!(Teacher::builtin("teacher-3"), None);
+        let [plain, polite] = Teacher::BUILTIN.map(read);
+        assert_eq!(plain.manner, None);
+        let manner = polite.manner.clone().unwrap();
+        assert!(manner.frames.len() >= 10 && manner.framed > Share(3_000), "{manner:?}");
+        assert!(manner.told_apart > Share(0) && manner.two_at_once > Share(0), "{manner:?}");
+        assert!(polite.wordings(Size::Part, "cool").len() > 3);
+    }
+
+    #[test]
+    fn a_manner_that_makes_no_sense_is_refused() {
+        let text = Teacher::builtin("teacher-2").unwrap();
+        let check = |from: &str, to: &str, expected: &str| {
+            assert!(text.contains(from), "{from}");
+            let error = Teacher::parse(&text.replace(from, to)).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        };
+        check("framed = ", "framed = 1", "framed is 1");
+        check("the other {name}", "the other {thing}", "needs {name} once");
+        check("please {request}", "please {request} {thing}", "means nothing there");
+        check("{first} and {second}", "{first} and {first}", "needs {first} once");
     }
 
     #[test]

@@ -104,6 +104,19 @@ fn asking_again_under_the_same_place_gives_the_same_episode_and_records_nothing(
 }
 
 #[test]
+fn a_polite_teacher_gets_on_and_is_the_same_each_time() {
+    let household = Arc::new(Household::new());
+    let service = service(&household);
+    let teacher = Teacher::parse(Teacher::builtin("teacher-2").unwrap()).unwrap();
+    let client = client(&service, "dora");
+    let first = live(&client, &household, &teacher);
+    let status = client.status().unwrap();
+    assert!(!first.0.is_empty());
+    assert_eq!(live(&client, &household, &teacher), first);
+    assert_eq!(client.status().unwrap().seq, status.seq);
+}
+
+#[test]
 fn meaning_is_free_of_walks_and_doors_and_of_nothing_else() {
     use crate::language::Program;
     use crate::world::Domain;

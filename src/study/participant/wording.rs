@@ -7,9 +7,8 @@ use super::parts::Unit;
 use super::teacher::{Share, Teacher};
 use crate::language::Symbol;
 use crate::numerics::Rng;
-use crate::world::Domain;
-use crate::world::Lexicon;
 use crate::world::household::{Household, Kind};
+use crate::world::{Domain, Edition, Lexicon};
 
 /// Letters of a word that a slip of the fingers is noticed in.
 const TYPO_LETTERS_MIN: usize = 4;
@@ -27,7 +26,7 @@ pub type Shunned = BTreeSet<(Symbol, String)>;
 
 impl<'a> Names<'a> {
     pub fn of(household: &'a Household) -> Names<'a> {
-        let lexicon = household.lexicon();
+        let lexicon = household.lexicon(Edition::First);
         let mut all: BTreeMap<Symbol, Vec<(&str, u32)>> = BTreeMap::new();
         for (name, meanings) in &lexicon.names {
             if let Some(first) = meanings.first() {
@@ -107,19 +106,30 @@ pub struct Words {
     pub names: Vec<(Symbol, String)>,
 }
 
+/// How things are told apart from others of their type: from the type to words for "the" and its
+/// name, with `{name}` where the name stands.
+pub type Apart = BTreeMap<Symbol, String>;
+
 /// A wording with names in it.
 fn fill(
     wording: &str,
     unit: &Unit,
+    apart: &Apart,
     mut name: impl FnMut(&Symbol) -> String,
     plural: impl Fn(&str) -> String,
 ) -> Words {
+    let told = |wording: &str, slot: &str, kind: &Symbol, name: &str| match apart.get(kind) {
+        Some(words) => wording.replace(&format!("the {slot}"), &words.replace("{name}", name)),
+        None => wording.to_owned(),
+    };
     let thing = name(&unit.thing);
-    let mut text = wording.replace("{things}", &plural(&thing)).replace("{thing}", &thing);
+    let text = told(wording, "{thing}", &unit.thing, &thing);
+    let mut text = text.replace("{things}", &plural(&thing)).replace("{thing}", &thing);
     let mut names = vec![(unit.thing.clone(), thing)];
     if let Some(place) = &unit.place {
         let inside = Kind::named(place.as_str()).is_some_and(Kind::inside);
         let said = name(place);
+        text = told(&text, "{place}", place, &said);
         text = text.replace("{place}", &said).replace("{light}", &said);
         text = text.replace("{prep}", if inside { "in" } else { "on" });
         names.push((place.clone(), said));
@@ -139,13 +149,14 @@ pub fn say(
     teacher: &Teacher,
     wording: &str,
     unit: &Unit,
+    apart: &Apart,
     rng: &mut Rng,
 ) -> Words {
     let name = |kind: &Symbol| match chance(rng, teacher.other_names) {
         true => names.any(kind, shunned, rng),
         false => names.plain(kind, shunned),
     };
-    let mut words = fill(wording, unit, name, |name| names.plural(name));
+    let mut words = fill(wording, unit, apart, name, |name| names.plural(name));
     if chance(rng, teacher.typos) {
         words.text = slip(&words.text, rng);
     }
@@ -154,7 +165,8 @@ pub fn say(
 
 /// The plainest way to say it.
 pub fn say_plainly(names: &Names<'_>, shunned: &Shunned, wording: &str, unit: &Unit) -> Words {
-    fill(wording, unit, |kind| names.plain(kind, shunned), |name| names.plural(name))
+    let name = |kind: &Symbol| names.plain(kind, shunned);
+    fill(wording, unit, &Apart::new(), name, |name| names.plural(name))
 }
 
 /// Two letters swapped inside one word that is long enough.
@@ -195,6 +207,28 @@ mod tests {
         check("{things} {prep} {place}", &two, "butter knives on counter");
         let nested = whole("nested Egg Bowl DiningTable", &[]).unwrap();
         check("a {carrier} with a {thing}", &nested, "a bowl with a egg");
+    }
+
+    #[test]
+    fn a_thing_is_told_apart_where_the_wording_has_room() {
+        let household = Household::new();
+        let names = Names::of(&household);
+        let teacher = Teacher::parse(&Teacher::TEXT.replace("typos = 0.01", "typos = 0.0"));
+        let put = primitive(&"PUT Mug Cabinet".parse().unwrap());
+        let apart = [("Mug", "the other {name}"), ("Cabinet", "{name} 2")];
+        let apart: Apart =
+            apart.iter().map(|(kind, words)| (Symbol::new(kind), (*words).to_owned())).collect();
+        let mut teacher = teacher.unwrap();
+        teacher.other_names = Share(0);
+        let mut rng = draw::rng(1, &["apart"]);
+        let mut check = |wording: &str, expected: &str| {
+            let shunned = Shunned::new();
+            let words = say(&names, &shunned, &teacher, wording, &put, &apart, &mut rng);
+            assert_eq!(words.text, expected);
+            assert_eq!(words.names[0].1, "mug");
+        };
+        check("put the {thing} {prep} the {place}", "put the other mug in cabinet 2");
+        check("a {thing}", "a mug");
     }
 
     #[test]

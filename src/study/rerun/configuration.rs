@@ -212,8 +212,8 @@ mod tests {
         let refused = |text: &str| text.parse::<With>().unwrap_err().to_string();
         assert_eq!(
             refused("condition=papr"),
-            "there is no condition \"papr\"; there are default, paper, grammar, seq2seq, \
-             seq2seq-grammar"
+            "there is no condition \"papr\"; there are default-1, default-2, paper, grammar, \
+             seq2seq, seq2seq-grammar"
         );
         for (text, part) in [
             ("tau", "\"tau\" names no configuration; possible are tau=0.3"),

@@ -225,11 +225,13 @@ impl<D: Domain> Walker<'_, D> {
         for (variant, asked) in here.asked.iter_mut().enumerate() {
             let closed = told.ends[variant].is_none();
             let mentioned = if closed { &asked.mentioned } else { &scene.mentioned };
+            let handled = scene.handled();
             let moment = Moment {
                 domain: &**self.domain,
                 scene: &*scene.scene,
                 task: &*scene.task,
                 mentioned: mentioned.as_ref(),
+                handled: &handled,
             };
             let said = &event.utterance;
             let answer = match &mut asked.minds {

@@ -202,6 +202,8 @@ fn plan_recorded(
         user: rows[0].user.clone(),
         egocentric: false,
         on: false,
+        hand: None,
+        next: None,
     };
     let mut rng = draw::rng(seed, &["study scene", id]);
     let scene = stages.set(&whole, Clashes::Avoided, &mut rng)?;

@@ -1,20 +1,24 @@
 use super::facts::{Kind, Room, facts};
 use super::features::{FEATURE_COUNT, features};
-use super::primitives::{Action, act};
+use super::primitives::{Action, Chosen, act_on};
 use super::scene::Scene;
+use super::state_words::StateWord;
 use super::task::{Goal, Task};
-use super::words::SORT;
-use super::{generate, planner, polarity, scene_file, task_goal, view, words};
+use super::words::{SORT, a};
+use super::{generate, planner, pointing, polarity, scene_file, task_goal, view, words};
 use crate::ids::Digest;
 use crate::language::{Mention, Operator, Program, Signature, Step, Symbol};
-use crate::world::{Domain, Infeasible, Lexicon, SeedSet, Stage, StageError, View};
+use crate::world::{
+    Domain, Edition, Infeasible, Lexicon, Pointing, SeedSet, Stage, StageError, View,
+};
 
 /// The household world: facts, names and seeds, read once from the embedded tables. One is made
 /// per process and shared behind an `Arc`.
 #[derive(Debug)]
 pub struct Household {
     signature: Signature,
-    lexicon: Lexicon,
+    /// By edition.
+    lexicons: [Lexicon; 2],
     seeds: SeedSet,
 }
 
@@ -28,7 +32,7 @@ impl Household {
         let mut operators: Vec<Operator> = one.iter().map(|name| operator(name, 1)).collect();
         operators.push(operator("PUT", 2));
         let signature = Signature { operators };
-        Household { signature, lexicon: words::lexicon(), seeds: words::seeds() }
+        Household { signature, lexicons: Edition::ALL.map(words::lexicon), seeds: words::seeds() }
     }
 
     /// The recorded combinations of things for one form of task, in the words of [`Task::read`],
@@ -64,8 +68,12 @@ impl Domain for Household {
         &self.signature
     }
 
-    fn lexicon(&self) -> &Lexicon {
-        &self.lexicon
+    fn lexicon(&self, edition: Edition) -> &Lexicon {
+        let [first, second] = &self.lexicons;
+        match edition {
+            Edition::First => first,
+            Edition::Second => second,
+        }
     }
 
     fn seeds(&self) -> &SeedSet {
@@ -89,16 +97,32 @@ impl Domain for Household {
     }
 
     fn step(&self, scene: &mut Scene, task: &Task, step: &Step) -> Result<Vec<String>, Infeasible> {
-        let infeasible = |reason: String| Infeasible { reason, first: None };
-        self.signature.check(step).map_err(infeasible)?;
-        let action = Action::read(step).map_err(infeasible)?;
-        match act(scene, task, action) {
-            Ok(bound) => Ok(bound.names(scene)),
-            Err(refusal) => Err(Infeasible {
+        self.step_on(scene, task, step, &[])
+    }
+
+    fn step_on(
+        &self,
+        scene: &mut Scene,
+        task: &Task,
+        step: &Step,
+        on: &[Option<String>],
+    ) -> Result<Vec<String>, Infeasible> {
+        self.signature.check(step).map_err(Infeasible::because)?;
+        let action = Action::read(step).map_err(Infeasible::because)?;
+        let chosen = chosen(scene, step, on).map_err(Infeasible::because)?;
+        act_on(scene, task, action, chosen).map(|bound| bound.names(scene)).map_err(|refusal| {
+            let (first, target) = refusal.first(scene, chosen).unzip();
+            Infeasible {
+                done: refusal.holds_already(scene, action),
                 reason: refusal.sentence(scene),
-                first: refusal.first(scene).map(Action::step),
-            }),
-        }
+                first: first.map(Action::step),
+                first_on: target
+                    .flatten()
+                    .map(|index| Some(scene.name(index)))
+                    .into_iter()
+                    .collect(),
+            }
+        })
     }
 
     fn achieved(&self, scene: &Scene, task: &Task) -> bool {
@@ -109,7 +133,8 @@ impl Domain for Household {
         planner::plan(scene, task)
     }
 
-    fn resolve(&self, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
+    fn resolve(&self, edition: Edition, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
+        let lexicon = self.lexicon(edition);
         // What is in sight comes before what is shut away, as when walking there.
         let distance = |name: &Symbol| {
             let kind = Kind::named(name.as_str())?;
@@ -120,7 +145,7 @@ impl Domain for Household {
             .iter()
             .enumerate()
             .filter_map(|(rank, name)| {
-                let rare = words::rarely_means(&self.lexicon, &mention.surface, name);
+                let rare = words::rarely_means(lexicon, &mention.surface, name);
                 distance(name).map(|far| (rare, far, rank))
             })
             .collect();
@@ -169,8 +194,25 @@ impl Domain for Household {
         polarity::contradiction(scene, words, program)
     }
 
+    fn is_on(&self, scene: &Scene, step: &Step) -> bool {
+        polarity::is_on(scene, step)
+    }
+
     fn unlike(&self, scene: &Scene, kind: &Symbol, word: &str) -> bool {
         polarity::unlike(scene, kind, word)
+    }
+
+    fn choose(
+        &self,
+        scene: &Scene,
+        kind: &Symbol,
+        pointing: &Pointing,
+    ) -> Result<Option<String>, String> {
+        pointing::choose(scene, kind, pointing)
+    }
+
+    fn is_instance_word(&self, word: &str) -> bool {
+        StateWord::read(word).is_some()
     }
 
     fn digest(&self, scene: &Scene) -> Digest {
@@ -192,6 +234,26 @@ impl Domain for Household {
     fn narrate(&self, step: &Step, binding: &[String]) -> String {
         view::narrate(step, binding)
     }
+}
+
+/// The instances with the names `on`, one per argument of the step.
+///
+/// - errors: a sentence, when there is no such thing or it is of another kind than the argument.
+fn chosen(scene: &Scene, step: &Step, on: &[Option<String>]) -> Result<Chosen, String> {
+    let mut chosen = [None, None];
+    for ((slot, name), kind) in chosen.iter_mut().zip(on).zip(&step.args) {
+        let Some(name) = name else { continue };
+        let Some(index) = scene.named(name) else {
+            let short: String = name.chars().take(40).collect();
+            return Err(format!("there is nothing called {short:?} here"));
+        };
+        let kind = facts().find(kind.as_str())?;
+        if scene.object(index).kind != kind {
+            return Err(format!("the {name} is not {}", a(kind.name())));
+        }
+        *slot = Some(index);
+    }
+    Ok(chosen)
 }
 
 /// Whether a scene that a person wrote has what the task names.

@@ -284,6 +284,15 @@ impl Kind {
         self.openable() && self.receptacle() && !self.pickupable()
     }
 
+    /// Furniture of which recorded rooms have several, or that has several parts of its name:
+    /// drawers, cabinets, shelves.
+    pub(super) fn comes_several(self) -> bool {
+        let several = |room: &Room| {
+            facts().room(*room).things.iter().any(|thing| thing.kind == self && thing.count.1 > 1)
+        };
+        !self.pickupable() && Room::ALL.iter().any(several)
+    }
+
     /// Whether `item` usually goes in or on this kind.
     pub fn usual_for(self, item: Kind) -> bool {
         item.facts().goes_in & (1 << self.0) != 0

@@ -24,6 +24,8 @@ pub struct MatchingScene<'a> {
     pub clashes: bool,
     /// Whether what the program toggles is on at first.
     pub on: bool,
+    /// What the robot holds at first, where the program does not say.
+    pub held: Option<Kind>,
     pub seed: u64,
 }
 
@@ -53,6 +55,9 @@ impl MatchingScene<'_> {
             self.program.steps.iter().map(Action::read).collect::<Result<_, _>>()?;
         let mut random = Random::new(self.seed);
         let mut sketch = Sketch::default();
+        if let Some(kind) = self.held {
+            sketch.held = Some(sketch.add(kind, None));
+        }
         for _ in 0..REPAIRS_MAX {
             let scene = sketch.build(self.room)?;
             match first_failure(&scene, &actions) {

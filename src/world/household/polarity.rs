@@ -1,8 +1,9 @@
 use super::facts::Kind;
 use super::primitives::{Action, Bound, act};
 use super::scene::{Scene, State};
+use super::state_words::StateWord;
 use super::task::Task;
-use crate::language::{Program, Symbol};
+use crate::language::{Program, Step, Symbol};
 
 /// Whether the words ask to turn on what is on, or off what is off. TOGGLE itself has no
 /// direction (the paper's primitive), so only the words can contradict the scene; and only when
@@ -43,18 +44,22 @@ fn wanted(words: &[String]) -> Option<bool> {
     }
 }
 
+/// Whether the thing that a TOGGLE would work is on.
+pub(super) fn is_on(scene: &Scene, step: &Step) -> bool {
+    let Ok(action @ Action::Toggle(_)) = Action::read(step) else { return false };
+    match act(&mut scene.clone(), &Task::free(), action) {
+        Ok(Bound::One(index)) => scene.object(index).is(State::On),
+        _ => false,
+    }
+}
+
 /// Whether all things of a type are in the state opposite to the one a word names. Nothing is known
 /// of a thing that is in neither, such as one that is neither hot nor cold: "the cooked potato".
 pub(super) fn unlike(scene: &Scene, kind: &Symbol, word: &str) -> bool {
-    const OPPOSITES: [(&[&str], State); 3] = [
-        (&["clean", "cleaned", "washed", "rinsed"], State::Dirty),
-        (&["cold", "chilled", "cooled"], State::Hot),
-        (&["hot", "heated", "warm", "warmed"], State::Cold),
-    ];
-    let Some((_, opposite)) = OPPOSITES.iter().find(|(words, _)| words.contains(&word)) else {
+    let Some(opposite) = StateWord::read(word).and_then(StateWord::opposite) else {
         return false;
     };
     let Some(kind) = Kind::named(kind.as_str()) else { return false };
     let mut things = scene.of(kind).peekable();
-    things.peek().is_some() && things.all(|index| scene.object(index).is(*opposite))
+    things.peek().is_some() && things.all(|index| scene.object(index).is(opposite))
 }

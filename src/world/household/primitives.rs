@@ -56,33 +56,72 @@ impl Action {
     }
 }
 
+/// What an argument may be bound to: every thing of a kind, or only the one that was chosen.
+#[derive(Clone, Copy)]
+struct Wanted {
+    kind: Kind,
+    chosen: Option<Index>,
+}
+
+impl Wanted {
+    fn candidates(self, scene: &Scene) -> impl Iterator<Item = Index> {
+        scene.of(self.kind).filter(move |&index| self.admits(index))
+    }
+
+    fn is(self, scene: &Scene, index: Index) -> bool {
+        scene.object(index).kind == self.kind && self.admits(index)
+    }
+
+    fn admits(self, index: Index) -> bool {
+        self.chosen.is_none_or(|chosen| chosen == index)
+    }
+}
+
+/// The instances that were chosen, one per argument of an action; none where it is free.
+pub(super) type Chosen = [Option<Index>; 2];
+
 /// Carries out one action, bound to the nearest instances for which it can run.
 ///
 /// - errors: [`Refusal`]; the scene is then unchanged.
 pub(super) fn act(scene: &mut Scene, task: &Task, action: Action) -> Result<Bound, Refusal> {
+    act_on(scene, task, action, [None, None])
+}
+
+/// As [`act`], with the chosen instances. Each is of the kind that its argument names.
+///
+/// - errors: [`Refusal`], about the chosen instance where there is one; the scene is then
+///   unchanged.
+pub(super) fn act_on(
+    scene: &mut Scene,
+    task: &Task,
+    action: Action,
+    [first, second]: Chosen,
+) -> Result<Bound, Refusal> {
+    let wanted = |kind: Kind| Wanted { kind, chosen: first };
     match action {
-        Action::Goto(kind) => goto(scene, task, kind),
-        Action::Pickup(kind) => pickup(scene, task, kind),
-        Action::Put(thing, place) => put(scene, thing, place),
-        Action::Open(kind) => open(scene, kind),
-        Action::Close(kind) => close(scene, kind),
-        Action::Toggle(kind) => toggle(scene, kind),
+        Action::Goto(kind) => goto(scene, task, wanted(kind)),
+        Action::Pickup(kind) => pickup(scene, task, wanted(kind)),
+        Action::Put(thing, kind) => put(scene, wanted(thing), Wanted { kind, chosen: second }),
+        Action::Open(kind) => open(scene, wanted(kind)),
+        Action::Close(kind) => close(scene, wanted(kind)),
+        Action::Toggle(kind) => toggle(scene, wanted(kind)),
     }
 }
 
-fn goto(scene: &mut Scene, task: &Task, kind: Kind) -> Result<Bound, Refusal> {
+fn goto(scene: &mut Scene, task: &Task, wanted: Wanted) -> Result<Bound, Refusal> {
     let carried = |scene: &Scene, index| match Some(scene.root(index)) == scene.robot.holds {
         true => Err(Refusal::InHand(index)),
         false => Ok(()),
     };
-    let target = bind(scene, kind, Some(task), carried)?;
+    let target = bind(scene, wanted, Some(task), carried)?;
     let root = scene.root(target);
     (scene.robot.x, scene.robot.y) = scene.place(root);
     scene.robot.at = Some(root);
     Ok(Bound::One(target))
 }
 
-fn pickup(scene: &mut Scene, task: &Task, kind: Kind) -> Result<Bound, Refusal> {
+fn pickup(scene: &mut Scene, task: &Task, wanted: Wanted) -> Result<Bound, Refusal> {
+    let kind = wanted.kind;
     if scene.of(kind).next().is_none() {
         return Err(Refusal::NoneHere(kind));
     }
@@ -90,10 +129,10 @@ fn pickup(scene: &mut Scene, task: &Task, kind: Kind) -> Result<Bound, Refusal> 
         return Err(Refusal::NotPickupable(kind));
     }
     if let Some(held) = scene.robot.holds {
-        let same = scene.object(held).kind == kind;
+        let same = wanted.is(scene, held);
         return Err(if same { Refusal::InHand(held) } else { Refusal::HandFull(held) });
     }
-    let target = bind(scene, kind, Some(task), reachable)?;
+    let target = bind(scene, wanted, Some(task), reachable)?;
     if scene.robot.at == Some(target) {
         scene.robot.at = None;
     }
@@ -103,9 +142,11 @@ fn pickup(scene: &mut Scene, task: &Task, kind: Kind) -> Result<Bound, Refusal> 
     Ok(Bound::One(target))
 }
 
-fn put(scene: &mut Scene, thing: Kind, place: Kind) -> Result<Bound, Refusal> {
-    let held = match scene.robot.holds {
-        Some(held) if scene.object(held).kind == thing => held,
+fn put(scene: &mut Scene, wanted: Wanted, target: Wanted) -> Result<Bound, Refusal> {
+    let (thing, place) = (wanted.kind, target.kind);
+    let held = match (scene.robot.holds, wanted.chosen) {
+        (Some(held), _) if wanted.is(scene, held) => held,
+        (_, Some(chosen)) => return Err(Refusal::OtherHeld(chosen)),
         _ if scene.of(thing).next().is_none() => return Err(Refusal::NoneHere(thing)),
         _ => return Err(Refusal::NotHeld(thing)),
     };
@@ -118,7 +159,7 @@ fn put(scene: &mut Scene, thing: Kind, place: Kind) -> Result<Bound, Refusal> {
     if !place.may_hold(thing) {
         return Err(Refusal::DoesNotGo(thing, place));
     }
-    let target = bind(scene, place, None, |scene, index| {
+    let target = bind(scene, target, None, |scene, index| {
         if scene.root(index) == held {
             return Err(Refusal::IntoItself(held));
         }
@@ -136,11 +177,12 @@ fn put(scene: &mut Scene, thing: Kind, place: Kind) -> Result<Bound, Refusal> {
     Ok(Bound::Two(held, target))
 }
 
-fn open(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
+fn open(scene: &mut Scene, wanted: Wanted) -> Result<Bound, Refusal> {
+    let kind = wanted.kind;
     if scene.of(kind).next().is_some() && !kind.openable() {
         return Err(Refusal::NotOpenable(kind));
     }
-    let target = bind(scene, kind, None, |scene, index| {
+    let target = bind(scene, wanted, None, |scene, index| {
         reachable(scene, index)?;
         let object = scene.object(index);
         match (object.shut(), object.is(State::On)) {
@@ -154,11 +196,12 @@ fn open(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
     Ok(Bound::One(target))
 }
 
-fn close(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
+fn close(scene: &mut Scene, wanted: Wanted) -> Result<Bound, Refusal> {
+    let kind = wanted.kind;
     if scene.of(kind).next().is_some() && !kind.openable() {
         return Err(Refusal::NotOpenable(kind));
     }
-    let target = bind(scene, kind, None, |scene, index| {
+    let target = bind(scene, wanted, None, |scene, index| {
         reachable(scene, index)?;
         match scene.object(index).shut() {
             true => Err(Refusal::AlreadyClosed(index)),
@@ -170,11 +213,12 @@ fn close(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
     Ok(Bound::One(target))
 }
 
-fn toggle(scene: &mut Scene, kind: Kind) -> Result<Bound, Refusal> {
+fn toggle(scene: &mut Scene, wanted: Wanted) -> Result<Bound, Refusal> {
+    let kind = wanted.kind;
     if scene.of(kind).next().is_some() && !kind.toggleable() {
         return Err(Refusal::NotToggleable(kind));
     }
-    let target = bind(scene, kind, None, |scene, index| {
+    let target = bind(scene, wanted, None, |scene, index| {
         reachable(scene, index)?;
         let object = scene.object(index);
         match kind.has_door() && !object.shut() && !object.is(State::On) {
@@ -201,7 +245,7 @@ fn reachable(scene: &Scene, index: Index) -> Result<(), Refusal> {
 /// What decides between instances, smallest first; the distance comes last.
 type Order = (bool, bool, (i64, i64));
 
-/// The nearest thing of `kind` that `can` be used. With a task (for walking and picking up), what
+/// The nearest of the candidates that `can` be used. With a task (for walking and picking up), what
 /// is not yet at its goal comes before what is, and what is in sight before what is shut away;
 /// ties go to the earlier thing.
 ///
@@ -209,13 +253,13 @@ type Order = (bool, bool, (i64, i64));
 ///   reason says more than "out of reach".
 fn bind(
     scene: &Scene,
-    kind: Kind,
+    wanted: Wanted,
     task: Option<&Task>,
     can: impl Fn(&Scene, Index) -> Result<(), Refusal>,
 ) -> Result<Index, Refusal> {
     let mut best: Option<(Order, Index)> = None;
     let mut reason: Option<(Order, Refusal)> = None;
-    for index in scene.of(kind) {
+    for index in wanted.candidates(scene) {
         match can(scene, index) {
             Ok(()) => {
                 let done = task.is_some_and(|task| at_goal(scene, task, index));
@@ -237,7 +281,7 @@ fn bind(
     match (best, reason) {
         (Some((_, index)), _) => Ok(index),
         (None, Some((_, refusal))) => Err(refusal),
-        (None, None) => Err(Refusal::NoneHere(kind)),
+        (None, None) => Err(Refusal::NoneHere(wanted.kind)),
     }
 }
 

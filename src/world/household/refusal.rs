@@ -1,5 +1,5 @@
 use super::facts::Kind;
-use super::primitives::Action;
+use super::primitives::{Action, Chosen};
 use super::scene::{Index, Scene};
 use super::words::a;
 
@@ -26,6 +26,8 @@ pub(super) enum Refusal {
     NotToggleable(Kind),
     /// The robot holds something else, or nothing.
     NotHeld(Kind),
+    /// The robot holds something else than this thing, or nothing.
+    OtherHeld(Index),
     NoReceptacle(Kind),
     /// The first kind does not go in or on the second.
     DoesNotGo(Kind, Kind),
@@ -73,6 +75,9 @@ impl Refusal {
                 format!("{} cannot be turned on or off", a(kind.name()))
             }
             Refusal::NotHeld(kind) => format!("the robot does not hold {}: {hand}", a(kind.name())),
+            Refusal::OtherHeld(index) => {
+                format!("the robot does not hold {}: {hand}", the(index))
+            }
             Refusal::NoReceptacle(kind) => {
                 format!("nothing can be put in or on {}", a(kind.name()))
             }
@@ -86,15 +91,37 @@ impl Refusal {
 }
 
 impl Refusal {
-    /// The action that would have to come first, where one action is what is missing.
-    pub fn first(self, scene: &Scene) -> Option<Action> {
-        let kind = |index: Index| scene.object(index).kind;
-        match self {
-            Refusal::OutOfReach(index) => Some(Action::Goto(kind(index))),
-            Refusal::ShutIn(_, around) => Some(Action::Open(kind(around))),
-            Refusal::Shut(index) => Some(Action::Open(kind(index))),
-            _ => None,
+    /// Whether what `action` is for holds already.
+    pub fn holds_already(self, scene: &Scene, action: Action) -> bool {
+        match (self, action) {
+            (Refusal::AlreadyOpen(_) | Refusal::AlreadyClosed(_), _) => true,
+            (Refusal::InHand(held), Action::Pickup(kind) | Action::Goto(kind)) => {
+                scene.object(held).kind == kind
+            }
+            // It was put there before, and is not in the hand any more.
+            (Refusal::NotHeld(thing), Action::Put(_, place)) => {
+                scene.robot.holds.is_none()
+                    && scene.of(thing).all(|index| {
+                        let around = scene.object(index).parent;
+                        around.is_some_and(|around| scene.object(around).kind == place)
+                    })
+            }
+            _ => false,
         }
+    }
+
+    /// The action that would have to come first, where one action is what is missing, and the
+    /// instance for it: none unless the thing that is refused was chosen.
+    pub fn first(self, scene: &Scene, chosen: Chosen) -> Option<(Action, Option<Index>)> {
+        let kind = |index: Index| scene.object(index).kind;
+        let (action, refused, target) = match self {
+            Refusal::OutOfReach(index) => (Action::Goto(kind(index)), index, index),
+            Refusal::ShutIn(index, around) => (Action::Open(kind(around)), index, around),
+            Refusal::Shut(index) => (Action::Open(kind(index)), index, index),
+            _ => return None,
+        };
+        // A free argument stays free, so that the first step binds as it always has.
+        Some((action, chosen.contains(&Some(refused)).then_some(target)))
     }
 }
 

@@ -172,6 +172,17 @@ impl Scene {
         }
     }
 
+    /// The thing with exactly the name that [`Scene::name`] gives it.
+    pub(super) fn named(&self, name: &str) -> Option<Index> {
+        let (kind, number) = match name.split_once(' ') {
+            Some((kind, number)) => (kind, number.parse::<usize>().ok()?),
+            None => (name, 1),
+        };
+        let index = self.of(Kind::named(kind)?).nth(number.checked_sub(1)?)?;
+        // "Mug" names none of several, and "Mug 1" or "Mug 02" is no name of the only one.
+        (self.name(index) == name).then_some(index)
+    }
+
     /// BLAKE3 over a fixed binary form: room, robot, number of things, eight bytes a thing.
     /// Absent indices are 0xffff; integers are big-endian.
     pub fn digest(&self) -> Digest {

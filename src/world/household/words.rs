@@ -1,11 +1,11 @@
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use serde::Deserialize;
 
 use super::facts::{embedded, facts};
 use crate::language::{Exemplar, Habits, LiftedUtterance, Roles, Symbol};
-use crate::world::{Lexicon, Meaning, SeedSet};
+use crate::world::{Edition, Lexicon, Meaning, SeedSet};
 
 /// The sort of every argument: a household has one.
 pub(super) const SORT: &str = "obj";
@@ -16,6 +16,13 @@ struct Words {
     adjectives: Vec<String>,
     plurals: BTreeMap<String, String>,
     fixtures: BTreeMap<String, String>,
+}
+
+/// What the second edition has besides.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Further {
+    plurals: BTreeMap<String, String>,
 }
 
 #[derive(Deserialize)]
@@ -32,11 +39,25 @@ struct Seeds {
     unknown: Vec<String>,
 }
 
-/// What things are called, from `names.toml` and `words.toml`.
-pub(super) fn lexicon() -> Lexicon {
-    let names: BTreeMap<String, BTreeMap<String, u32>> =
+/// From a name to how often it was said of each type.
+type NameTable = BTreeMap<String, BTreeMap<String, u32>>;
+
+/// What things are called, from `names.toml` and `words.toml`; in the second edition as changed by
+/// `names-2.toml` and `words-2.toml`.
+pub(super) fn lexicon(edition: Edition) -> Lexicon {
+    let mut names: NameTable =
         embedded("names.toml", include_str!("../../../data/household/names.toml"));
-    let words: Words = embedded("words.toml", include_str!("../../../data/household/words.toml"));
+    let mut words: Words =
+        embedded("words.toml", include_str!("../../../data/household/words.toml"));
+    if edition == Edition::Second {
+        let changed: NameTable =
+            embedded("names-2.toml", include_str!("../../../data/household/names-2.toml"));
+        let further: Further =
+            embedded("words-2.toml", include_str!("../../../data/household/words-2.toml"));
+        names.extend(changed);
+        names.retain(|_, meant| !meant.is_empty());
+        words.plurals.extend(further.plurals);
+    }
     let known = |name: &str| facts().kind(name).expect("tables name only kinds of types.toml");
     let meanings = |meant: BTreeMap<String, u32>| {
         let meaning = |(kind, count): (String, u32)| Meaning {
@@ -58,7 +79,7 @@ pub(super) fn lexicon() -> Lexicon {
             .into_iter()
             .map(|(kind, word)| (known(&kind).symbol().clone(), word))
             .collect(),
-        habits: Some(Arc::new(habits())),
+        habits: Some(Arc::clone(&HABITS)),
         roles: Roles {
             going: Some(Symbol::new("GOTO")),
             taking: Some(Symbol::new("PICKUP")),
@@ -67,6 +88,9 @@ pub(super) fn lexicon() -> Lexicon {
         },
     }
 }
+
+/// All editions have the same habits.
+static HABITS: LazyLock<Arc<Habits>> = LazyLock::new(|| Arc::new(habits()));
 
 /// How recorded people used words for the primitives, from `habits.toml`.
 fn habits() -> Habits {

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::super::facts::{Room, facts};
 use super::{Household, Task};
 use crate::language::{LiftedArg, Word};
-use crate::world::Domain;
+use crate::world::{Domain, Edition, Lexicon};
 
 #[test]
 fn every_recorded_task_makes_sense() {
@@ -25,7 +25,12 @@ fn everything_that_can_be_carried_can_be_put_somewhere() {
 #[test]
 fn names_are_lower_case_and_every_kind_has_one() {
     let household = Household::new();
-    let lexicon = household.lexicon();
+    for edition in Edition::ALL {
+        check_names(household.lexicon(edition));
+    }
+}
+
+fn check_names(lexicon: &Lexicon) {
     let mut named = BTreeSet::new();
     for (name, meanings) in &lexicon.names {
         assert_eq!(*name, name.to_lowercase());

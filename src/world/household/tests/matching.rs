@@ -5,7 +5,7 @@ use std::path::Path;
 use super::super::{MatchingScene, Room};
 use super::{Household, Scene, Task, run};
 use crate::language::Program;
-use crate::world::Domain;
+use crate::world::{Domain, Edition};
 
 fn matching(household: &Household, program: &str, seed: u64) -> Result<Scene, String> {
     let program: Program = program.parse().unwrap();
@@ -15,9 +15,10 @@ fn matching(household: &Household, program: &str, seed: u64) -> Result<Scene, St
         others: 10,
         clashes: false,
         on: false,
+        held: None,
         seed,
     };
-    request.build(household.lexicon())
+    request.build(household.lexicon(Edition::First))
 }
 
 #[test]
@@ -40,7 +41,7 @@ fn a_matching_scene_has_what_the_program_needs_and_ten_other_things_with_other_n
             assert!(kinds.len() >= 11, "{program}, seed {seed}");
             let gold = program.split([' ', ';']).filter(|word| kinds.iter().any(|k| *k == *word));
             let gold: Vec<&str> = gold.collect();
-            for meanings in household.lexicon().names.values() {
+            for meanings in household.lexicon(Edition::First).names.values() {
                 let shared = |kind: &&crate::language::Symbol| {
                     meanings.iter().any(|m| m.kind == **kind) && !gold.contains(&kind.as_str())
                 };
@@ -94,10 +95,11 @@ fn recorded_plans_run_in_matching_scenes() {
                 others: 10,
                 clashes: false,
                 on: false,
+                held: None,
                 seed: 7,
             };
             all += count;
-            match request.build(household.lexicon()) {
+            match request.build(household.lexicon(Edition::First)) {
                 Ok(_) => fit += count,
                 Err(reason) => reasons.push((*count, format!("{text}: {reason}"))),
             }

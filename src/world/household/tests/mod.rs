@@ -2,15 +2,17 @@
 
 mod facts;
 mod matching;
+mod names;
 mod planner;
+mod pointing;
 mod primitives;
 mod speed;
 mod stages;
 mod talk;
 
 use super::{Household, Scene, Task};
-use crate::language::Program;
-use crate::world::{Domain, Stage};
+use crate::language::{Mention, Program, Symbol};
+use crate::world::{Domain, Edition, Stage};
 
 pub(super) const EXAMPLE: &str = include_str!("../../../../data/household/example_scene.toml");
 
@@ -42,4 +44,16 @@ pub(super) fn run(
         }
     }
     Ok(bound)
+}
+
+/// A name of the lexicon, as it is found in an utterance.
+pub(super) fn mention(household: &Household, edition: Edition, surface: &str) -> Mention {
+    let meanings = &household.lexicon(edition).names[surface];
+    Mention {
+        surface: surface.to_owned(),
+        sort: Symbol::new("obj"),
+        types: meanings.iter().map(|meaning| meaning.kind.clone()).collect(),
+        pronoun: false,
+        plural: false,
+    }
 }

@@ -1,35 +1,34 @@
 use super::{Household, kitchen, run};
 use crate::language::{Mention, Symbol};
-use crate::world::Domain;
+use crate::world::{Domain, Edition};
 
 fn mention(household: &Household, surface: &str) -> Mention {
-    let meanings = &household.lexicon().names[surface];
-    Mention {
-        surface: surface.to_owned(),
-        sort: Symbol::new("obj"),
-        types: meanings.iter().map(|meaning| meaning.kind.clone()).collect(),
-        pronoun: false,
-        plural: false,
-    }
+    super::mention(household, Edition::First, surface)
 }
 
 #[test]
 fn a_shared_name_means_what_is_nearest_and_here() {
     let (household, mut scene, task) = kitchen("free");
     // There is no Cup, only mugs; and one dining table among the tables.
-    assert_eq!(household.resolve(&scene, &mention(&household, "cup"))[0], "Mug");
-    assert_eq!(household.resolve(&scene, &mention(&household, "table")), ["DiningTable"]);
+    assert_eq!(household.resolve(Edition::First, &scene, &mention(&household, "cup"))[0], "Mug");
+    assert_eq!(
+        household.resolve(Edition::First, &scene, &mention(&household, "table")),
+        ["DiningTable"]
+    );
     // Sink and faucet are at the same place: people mean the basin.
     run(&household, &mut scene, &task, "GOTO SinkBasin").unwrap();
     assert_eq!(
-        household.resolve(&scene, &mention(&household, "sink")),
+        household.resolve(Edition::First, &scene, &mention(&household, "sink")),
         ["SinkBasin", "Faucet", "CounterTop"]
     );
     // Hardly anybody calls a plate a bowl; but when there is no bowl, somebody may.
-    assert_eq!(household.resolve(&scene, &mention(&household, "bowl")), ["Plate"]);
-    assert_eq!(household.resolve(&scene, &mention(&household, "pan")), ["Plate"]);
+    assert_eq!(household.resolve(Edition::First, &scene, &mention(&household, "bowl")), ["Plate"]);
+    assert_eq!(household.resolve(Edition::First, &scene, &mention(&household, "pan")), ["Plate"]);
     // Nothing of the name is here: the mention's own order, so that somebody can say so.
-    assert_eq!(household.resolve(&scene, &mention(&household, "lamp")), ["DeskLamp", "FloorLamp"]);
+    assert_eq!(
+        household.resolve(Edition::First, &scene, &mention(&household, "lamp")),
+        ["DeskLamp", "FloorLamp"]
+    );
 }
 
 #[test]

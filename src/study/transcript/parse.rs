@@ -1,4 +1,4 @@
-use super::line::{Act, Answer, Kind, Line, Setting, Transcript};
+use super::line::{Act, Answer, Kind, Line, Request, Setting, Transcript};
 use crate::language::Program;
 use crate::plain;
 use crate::session::OnClash;
@@ -14,7 +14,7 @@ pub struct SyntaxError {
 }
 
 const FIRST_WORDS: &str = "a line starts with user, recipe, scene, task, seed, episode, >, =, ?, \
-     !, x, achieved, teach, learn, forget, done or #";
+     !, x, ~~, achieved, teach, learn, forget, done or #";
 
 impl Transcript {
     /// Reads the notation of `docs/transcripts.md`.
@@ -42,12 +42,21 @@ impl Transcript {
 /// Headers of the whole file come before the first act, and an answer needs something to answer.
 fn check_places(lines: &[Line]) -> Result<(), SyntaxError> {
     let mut acted = false;
+    let mut said = false;
     let mut recipe = None;
     let mut user = None;
     for line in lines {
         let wrong = |reason: String| Err(SyntaxError { line: line.number, column: 1, reason });
         match &line.kind {
-            Kind::Act(_) => acted = true,
+            Kind::Act(act) => {
+                acted = true;
+                said = matches!(act, Act::Say(_));
+            }
+            Kind::Meant(_) if !said => {
+                return wrong(
+                    "~~ says what the utterance above it meant, and there is none".into(),
+                );
+            }
             Kind::Answer(_) if !acted => {
                 return wrong("this answer has nothing above it to answer".to_owned());
             }
@@ -64,6 +73,20 @@ fn check_places(lines: &[Line]) -> Result<(), SyntaxError> {
                 }
             }
             _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Every name is of a type of the program, and no type has two.
+fn check_names(program: &Program, on: &[String]) -> Result<(), String> {
+    let kinds: Vec<&str> = on.iter().map(|name| Request::kind(name)).collect();
+    for (place, (name, kind)) in on.iter().zip(&kinds).enumerate() {
+        if !program.steps.iter().any(|step| step.args.iter().any(|arg| arg == *kind)) {
+            return Err(format!("{program} names no thing that {name:?} could be"));
+        }
+        if kinds[..place].contains(kind) {
+            return Err(format!("{name:?} is the second {kind}; one can be meant"));
         }
     }
     Ok(())
@@ -100,6 +123,7 @@ impl<'a> Cursor<'a> {
                 let code = self.name("the code of a rejection, such as wrong_phase")?;
                 self.end(Kind::Answer(Answer::Refused(code)))
             }
+            "~~" => self.meant().map(Kind::Meant),
             "achieved" => self.end(Kind::Answer(Answer::Achieved)),
             "user" => self.setting("the person's name", Setting::User),
             "recipe" => self.setting("the recipe's name", Setting::Recipe),
@@ -126,6 +150,32 @@ impl<'a> Cursor<'a> {
                 Err(self.error(format!("found {found:?}, but {FIRST_WORDS}")))
             }
         }
+    }
+
+    /// `nothing`, or a program, perhaps with the things that were meant: `PICKUP Mug on Mug 2`.
+    fn meant(&mut self) -> Result<Option<Request>, SyntaxError> {
+        self.skip_blanks();
+        let start = self.rest;
+        let text = self.until_bracket();
+        if text == "nothing" {
+            return Ok(None);
+        }
+        let (program, on) = match text.split_once(" on ") {
+            Some((program, names)) => (program, names.split(',').map(str::trim).collect()),
+            None => (text, Vec::new()),
+        };
+        let request = program.parse::<Program>().map_err(|error| {
+            let what = "expected nothing, or a program such as PICKUP Mug on Mug 2";
+            format!("{error}; {what}")
+        });
+        let request = request.and_then(|program| {
+            let on: Vec<String> = on.into_iter().map(str::to_owned).collect();
+            check_names(&program, &on).map(|()| Request { program, on })
+        });
+        request.map(Some).map_err(|reason| {
+            self.rest = start;
+            self.error(reason)
+        })
     }
 
     fn impossible(&mut self) -> Result<Kind, SyntaxError> {
@@ -361,6 +411,22 @@ learn    45 examples
     }
 
     #[test]
+    fn what_was_meant_is_read_with_its_things() {
+        let meant = |text: &str| match kinds(&format!("> a\n{text}")).pop().unwrap() {
+            Kind::Meant(request) => request,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(meant("~~ nothing"), None);
+        let request = meant("~~ PICKUP Mug; PUT Mug Cabinet on Mug 2, Cabinet 1 (why)").unwrap();
+        assert_eq!(request.program, "PICKUP Mug; PUT Mug Cabinet".parse().unwrap());
+        assert_eq!(request.on, ["Mug 2", "Cabinet 1"]);
+        let chosen = request.chosen(&request.program.steps[1]);
+        assert_eq!(chosen, [Some("Mug 2".to_owned()), Some("Cabinet 1".to_owned())]);
+        assert_eq!(request.to_string(), "PICKUP Mug; PUT Mug Cabinet on Mug 2, Cabinet 1");
+        assert_eq!(meant("~~ GOTO Mug").unwrap().on, [""; 0]);
+    }
+
+    #[test]
     fn an_utterance_is_taken_as_it_stands() {
         assert_eq!(act("> wash (the) \"mug\" # now"), Act::Say("wash (the) \"mug\" # now".into()));
         assert_eq!(act(">"), Act::Say(String::new()));
@@ -398,6 +464,11 @@ learn    45 examples
             ("> a\n= GOTO Mug; ; PICKUP Mug", 2, 3, "step 2 of the program is empty"),
             ("> a\n! impossible GOTO Mug", 2, 14, "expected PROGRAM step N"),
             ("> a\n? not certain", 2, 7, "found \"certain\", expected sure"),
+            ("~~ nothing", 1, 1, "meant, and there is none"),
+            ("> a\ndone\n~~ nothing", 3, 1, "meant, and there is none"),
+            ("> a\n~~ ", 2, 4, "expected nothing, or a program"),
+            ("> a\n~~ PICKUP Mug on Cup 2", 2, 4, "names no thing that \"Cup 2\" could be"),
+            ("> a\n~~ PICKUP Mug on Mug 2, Mug 1", 2, 4, "the second Mug"),
             ("learn 45", 1, 9, "found \"\", expected examples"),
             ("> a\ndone now", 2, 6, "expected the end of the line"),
             ("= GOTO Mug", 1, 1, "nothing above it"),

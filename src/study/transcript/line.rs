@@ -1,4 +1,6 @@
-use crate::language::Program;
+use std::fmt;
+
+use crate::language::{Program, Step, Symbol};
 use crate::session::OnClash;
 
 /// A transcript: its lines in order, every one of them.
@@ -23,6 +25,18 @@ pub enum Kind {
     Setting(Setting),
     Act(Act),
     Answer(Answer),
+    /// What the utterance above asked for; none when it asked for nothing. Who plays the transcript
+    /// passes it over.
+    Meant(Option<Request>),
+}
+
+/// What an utterance asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    pub program: Program,
+    /// Names of things ([`crate::world::Thing::name`]), at most one of each type of the program:
+    /// wherever a step names its type, this one was meant.
+    pub on: Vec<String>,
 }
 
 /// What holds for the lines below it.
@@ -93,6 +107,33 @@ impl Transcript {
             Kind::Setting(setting) => Some(setting),
             _ => None,
         })
+    }
+}
+
+impl Request {
+    /// The type of a thing by its name: `Mug` of `Mug 2`.
+    pub fn kind(name: &str) -> &str {
+        match name.rsplit_once(' ') {
+            Some((kind, number)) if number.bytes().all(|byte| byte.is_ascii_digit()) => kind,
+            _ => name,
+        }
+    }
+
+    /// The things that the arguments of a step were meant to be; none where any will do.
+    pub fn chosen(&self, step: &Step) -> Vec<Option<String>> {
+        let named =
+            |kind: &Symbol| self.on.iter().find(|name| *kind == *Request::kind(name)).cloned();
+        step.args.iter().map(named).collect()
+    }
+}
+
+impl fmt::Display for Request {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.program)?;
+        match self.on.is_empty() {
+            true => Ok(()),
+            false => write!(f, " on {}", self.on.join(", ")),
+        }
     }
 }
 

@@ -1,0 +1,327 @@
+//! Whether a reading uses every word that asks for something. What it would pass over is named, and
+//! the reading is not taken.
+
+use super::settings::Accounting;
+use crate::language::{Clause, Grammar, LiftedUtterance, Roles, Symbol, Word, WordLists};
+
+/// A clause whose words are accounted for.
+pub(super) struct Account<'a> {
+    pub lists: &'a WordLists,
+    /// The domain's.
+    pub adjectives: &'a [String],
+    pub roles: &'a Roles,
+    pub accounting: &'a Accounting,
+    pub clause: &'a Clause,
+}
+
+/// What stands where a thing is named.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Head<'a> {
+    /// A thing that is known.
+    Known,
+    /// A noun that names nothing known.
+    Unknown(&'a str),
+    /// No thing.
+    Nothing,
+}
+
+impl<'a> Account<'a> {
+    /// The words that a reading as one primitive passes over: a thing or a place that nobody knows,
+    /// and degrees of what is only switched.
+    ///
+    /// Only words where the object stands, where the place of a way or a putting stands, and behind
+    /// a joining word count. Near what a thing is, may be called as people like: half of the
+    /// recorded landmarks have no name here.
+    pub fn of_primitive(&self, operator: &Symbol) -> Vec<String> {
+        let mut left = Vec::new();
+        let works = !self.roles.goes(operator)
+            && !self.roles.takes(operator)
+            && !self.roles.puts(operator)
+            && !self.roles.is_door(operator);
+        left.extend(match self.roles.goes(operator) {
+            true => self.unknown_way(),
+            false => self.unknown_object(),
+        });
+        if self.roles.puts(operator) {
+            left.extend(self.unknown_place());
+        }
+        left.extend(self.numbers());
+        if self.roles.is_door(operator) {
+            left.extend(self.unknown_tool());
+        }
+        if works {
+            left.extend(self.towards());
+            left.extend(self.degrees());
+        }
+        left.extend(self.unknown_joined());
+        owned(left)
+    }
+
+    /// The words that a lesson passes over: a thing that nobody knows and that the lesson did not
+    /// name either.
+    pub fn of_lesson(&self, taught: &LiftedUtterance) -> Vec<String> {
+        let in_lesson = |word: &&str| {
+            taught.words.iter().any(|known| matches!(known, Word::Text(text) if text == word))
+        };
+        let left = self.unknown_object().into_iter().chain(self.unknown_joined());
+        let left = left.chain(self.numbers());
+        owned(left.filter(|word| !in_lesson(word)))
+    }
+
+    /// The words that a clause without a deed passes over: a way to what nobody knows.
+    pub fn of_idle(&self) -> Vec<String> {
+        let ways = self.texts().filter(|(_, word)| self.lists.destination.contains(*word));
+        let unknown = ways.filter_map(|(at, _)| match self.head(at + 1, false) {
+            Head::Unknown(word) => Some(word),
+            _ => None,
+        });
+        owned(unknown)
+    }
+
+    /// "2 apples", "20 %": no step has a number.
+    fn numbers(&self) -> Option<&'a str> {
+        // "For 2 seconds" is how long, which a parser judges.
+        let lasts = |at: usize| matches!(self.words().get(at + 1), Some(Word::Text(next)) if self.lists.lasting.contains(next));
+        let number = |(at, word): &(usize, &str)| {
+            word.bytes().all(|byte| byte.is_ascii_digit()) && !lasts(*at)
+        };
+        self.texts().find(number).map(|(_, word)| word)
+    }
+
+    /// "Open the fridge with the hammer".
+    fn unknown_tool(&self) -> Option<&'a str> {
+        let with = self.texts().find(|(_, word)| *word == "with")?;
+        match self.head(with.0 + 1, false) {
+            Head::Unknown(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    /// "Turn the lamp to the left": what is only switched goes nowhere. "Next to the cup" and "to the
+    /// left of the cup" are where it is.
+    fn towards(&self) -> Option<&'a str> {
+        let text = |at: usize| match self.words().get(at) {
+            Some(Word::Text(word)) => Some(word.as_str()),
+            _ => None,
+        };
+        let aside = |word: &str| {
+            self.lists.stop.contains(word)
+                || self.lists.determiners.contains(word)
+                || self.accounting.harmless.contains(word)
+        };
+        let near = |at: usize| {
+            let of = (at + 1..self.words().len())
+                .find(|&at| !text(at).is_some_and(|w| aside(w) && w != "of"));
+            at.checked_sub(1).and_then(text).is_some_and(aside) || of.and_then(text) == Some("of")
+        };
+        let to = |(at, word): &(usize, &str)| self.lists.destination.contains(*word) && !near(*at);
+        self.texts().find(to).map(|(_, word)| word)
+    }
+
+    /// "Turn the lamp up", "red": where the clause ends or a function word follows.
+    fn degrees(&self) -> Option<&'a str> {
+        let ends = |at: usize| match self.words().get(at + 1) {
+            None => true,
+            Some(Word::Text(next)) => self.lists.stop.contains(next),
+            Some(Word::Slot { .. }) => {
+                self.grammar().main_verb(self.words()).is_some_and(|verb| verb.at + 1 == at)
+            }
+        };
+        let degree =
+            |(at, word): &(usize, &str)| self.accounting.degrees.contains(*word) && ends(*at);
+        self.texts().find(degree).map(|(_, word)| word)
+    }
+
+    fn words(&self) -> &'a [Word] {
+        &self.clause.lifted.words
+    }
+
+    fn texts(&self) -> impl Iterator<Item = (usize, &'a str)> {
+        self.words().iter().enumerate().filter_map(|(at, word)| match word {
+            Word::Text(text) => Some((at, text.as_str())),
+            Word::Slot { .. } => None,
+        })
+    }
+
+    fn grammar(&self) -> Grammar<'a> {
+        Grammar { lists: self.lists, adjectives: self.adjectives }
+    }
+
+    /// Behind the verb and its particles.
+    fn object_at(&self) -> usize {
+        let after = self.grammar().main_verb(self.words()).map_or(0, |verb| verb.at + 1);
+        let passed = |word: &&Word| match word {
+            Word::Text(text) => {
+                self.lists.passed.contains(text)
+                    || self.lists.verb_particles.contains(text)
+                    || self.lists.adverbs.contains(text)
+            }
+            Word::Slot { .. } => false,
+        };
+        after + self.words()[after..].iter().take_while(passed).count()
+    }
+
+    fn unknown_object(&self) -> Option<&'a str> {
+        match self.head(self.object_at(), true) {
+            Head::Unknown(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    /// Of a way, what stands behind the first word that says where to; of "face the …" the object.
+    fn unknown_way(&self) -> Option<&'a str> {
+        let verb = self.grammar().main_verb(self.words()).map_or(0, |verb| verb.at);
+        let mut ways = self.texts().filter(|(at, word)| {
+            *at > verb && (self.lists.toward.contains(*word) || *word == "on" || *word == "in")
+        });
+        let from = ways.next().map_or_else(|| self.object_at(), |(at, _)| at + 1);
+        match self.head(from, false) {
+            Head::Unknown(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    /// Of a putting, what stands behind the first preposition that a thing follows.
+    fn unknown_place(&self) -> Option<&'a str> {
+        let onto = |word: &str| self.lists.onto.contains(word) || self.lists.inside.contains(word);
+        // "To the left of the drain" says near what, not where to.
+        let aside = |at: usize| {
+            let mut after = self.words()[at + 1..].iter();
+            let next = after.find(|word| match word {
+                Word::Text(text) => !self.lists.determiners.contains(text),
+                Word::Slot { .. } => true,
+            });
+            matches!(next, Some(Word::Text(text)) if self.lists.stop.contains(text)
+                || self.accounting.harmless.contains(text))
+        };
+        let places = self.texts().filter(|(at, word)| {
+            onto(word) && !(self.lists.destination.contains(*word) && aside(*at))
+        });
+        places.map(|(at, _)| self.head(at + 1, false)).find_map(|head| match head {
+            Head::Nothing => None,
+            Head::Known => Some(None),
+            Head::Unknown(word) => Some(Some(word)),
+        })?
+    }
+
+    /// "The mug and the banana", "and sing": behind a joining word.
+    fn unknown_joined(&self) -> Option<&'a str> {
+        let verb = self.grammar().main_verb(self.words()).map(|verb| verb.at);
+        let mut joined = self.texts().filter(|(_, word)| self.lists.cuts.contains(*word));
+        joined.find_map(|(at, word)| match (self.head(at + 1, false), self.words().get(at + 1)) {
+            (Head::Unknown(word), _) => Some(word),
+            (_, Some(Word::Text(next))) if self.is_content(next) => Some(next.as_str()),
+            // "Go and the mug".
+            (Head::Known, next) if verb.is_some_and(|verb| verb + 1 == at) => match next {
+                Some(Word::Text(next)) if !self.lists.determiners.contains(next) => None,
+                _ => Some(word),
+            },
+            _ => None,
+        })
+    }
+
+    /// Whether a word is no function word.
+    fn is_content(&self, word: &str) -> bool {
+        let lists = self.lists;
+        !lists.stop.contains(word)
+            && !lists.silent.contains(word)
+            && !lists.determiners.contains(word)
+            && !lists.adverbs.contains(word)
+            && !lists.particles.contains(word)
+            && !lists.joints.contains(word)
+            && !lists.purposes.contains(word)
+            && !lists.verbs.contains(&lists.base(word))
+            && !lists.noun_verbs.contains(word)
+            && !self.accounting.harmless.contains(word)
+            && !self.grammar().is_adjective(word)
+    }
+
+    /// What the words from `at` on name: the last noun before a word of another sort.
+    ///
+    /// - `object`: whether the thing that is acted on stands there, of which a part is another thing.
+    fn head(&self, mut at: usize, object: bool) -> Head<'a> {
+        let part = |text: &String| !object && self.accounting.parts.contains(text);
+        let words = self.words();
+        let mut unknown = None;
+        let mut determined = false;
+        while let Some(word) = words.get(at) {
+            match word {
+                Word::Slot { .. } => {
+                    // "The apple pie" is no apple.
+                    return match words.get(at + 1) {
+                        Some(Word::Text(next)) if self.is_noun(next, false) && !part(next) => {
+                            Head::Unknown(next)
+                        }
+                        _ => Head::Known,
+                    };
+                }
+                Word::Text(text) if self.lists.determiners.contains(text) => determined = true,
+                // "The hammer near the fridge".
+                Word::Text(text) if unknown.is_some() && self.lists.stop.contains(text) => break,
+                Word::Text(text) if self.grammar().is_adjective(text) => {}
+                // "The open space".
+                Word::Text(text)
+                    if determined && (self.accounting.harmless.contains(text) || part(text)) =>
+                {
+                    unknown = None;
+                }
+                Word::Text(text) if self.is_noun(text, determined) => unknown = Some(text.as_str()),
+                // "The left side of the fridge", "the door of the fridge".
+                Word::Text(text) if text == "of" && unknown.is_none() => {}
+                Word::Text(_) if unknown.is_none() && self.leads_to_of(at) => {}
+                Word::Text(_) => break,
+            }
+            at += 1;
+        }
+        unknown.map_or(Head::Nothing, Head::Unknown)
+    }
+
+    /// Whether a harmless noun stands at `at`, and "of" behind it.
+    fn leads_to_of(&self, at: usize) -> bool {
+        let text = |at: usize| match self.words().get(at) {
+            Some(Word::Text(text)) => Some(text.as_str()),
+            _ => None,
+        };
+        let harmless =
+            |word: &str| self.accounting.harmless.contains(word) || self.lists.stop.contains(word);
+        text(at).is_some_and(harmless)
+            && (text(at + 1) == Some("of")
+                || (text(at + 1).is_some_and(harmless) && text(at + 2) == Some("of")))
+    }
+
+    /// Whether a word may be the name of a thing.
+    ///
+    /// - `determined`: whether an article stands before it; "the drink" is no drinking.
+    fn is_noun(&self, word: &str, determined: bool) -> bool {
+        let lists = self.lists;
+        let aside = lists.stop.contains(word)
+            || lists.silent.contains(word)
+            || lists.adverbs.contains(word)
+            || lists.particles.contains(word)
+            || lists.joints.contains(word)
+            || lists.determiners.contains(word)
+            || lists.landmarks.contains(word)
+            || lists.toward.contains(word)
+            || lists.leaving.contains(word)
+            || lists.lasting.contains(word)
+            || lists.is_portion(word)
+            || self.accounting.harmless.contains(word)
+            || self.grammar().is_adjective(word)
+            || !word.chars().all(char::is_alphabetic);
+        let acts = word.ends_with("ing")
+            || word.ends_with("ed")
+            || lists.verbs.contains(word)
+            || lists.noun_verbs.contains(word);
+        !aside && (determined || !acts)
+    }
+}
+
+fn owned<'w>(words: impl IntoIterator<Item = &'w str>) -> Vec<String> {
+    let mut left: Vec<String> = Vec::new();
+    for word in words {
+        if left.iter().all(|known| known != word) {
+            left.push(word.to_owned());
+        }
+    }
+    left
+}

@@ -1,0 +1,347 @@
+//! What people put around a request: addresses, courtesies, fillers. It is taken away before
+//! anything is lifted, so that a lesson and a later request meet in their bare forms.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use super::names::one_slip_apart;
+use crate::language::WordLists;
+
+/// Phrases that ask for nothing by themselves. Data of a recipe, in lower case.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frames {
+    /// Where a request begins: "could you please", "robot", "ok". Those of several words also where
+    /// a later clause begins.
+    pub openers: BTreeSet<String>,
+    /// The same before a verb in -ing: "would you mind".
+    pub gerunds: BTreeSet<String>,
+    /// Where an utterance ends: "for me", "thank you".
+    pub closers: BTreeSet<String>,
+    /// Anywhere: "please".
+    pub fillers: BTreeSet<String>,
+    /// Before another verb: "go and", "come".
+    pub going: BTreeSet<String>,
+    /// Words behind which an opener is none: "next TO the sink".
+    pub unless_before: BTreeSet<String>,
+}
+
+/// The words of an utterance without its frames.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Framed {
+    /// Words and clause marks.
+    pub tokens: Vec<String>,
+    /// What was taken away, phrase by phrase.
+    pub frames: Vec<String>,
+}
+
+impl Framed {
+    pub fn bare(tokens: Vec<String>) -> Framed {
+        Framed { tokens, frames: Vec::new() }
+    }
+}
+
+impl Frames {
+    /// Takes the frames away. One word at least is always left.
+    ///
+    /// - `says`: whether a word says something that must not be taken for a name ("tomorrow, …").
+    pub(super) fn strip(
+        &self,
+        tokens: Vec<String>,
+        lists: Option<&WordLists>,
+        says: &dyn Fn(&str) -> bool,
+    ) -> Framed {
+        let mut framed = Framed::bare(tokens);
+        while self.open(&mut framed, lists, says) || self.close(&mut framed) {}
+        self.strip_later_clauses(&mut framed, lists);
+        framed
+    }
+
+    /// Takes one opener away.
+    fn open(
+        &self,
+        framed: &mut Framed,
+        lists: Option<&WordLists>,
+        says: &dyn Fn(&str) -> bool,
+    ) -> bool {
+        let marks = framed.tokens.iter().take_while(|token| is_mark(token)).count();
+        framed.tokens.drain(..marks);
+        self.open_at(0, framed, lists, 1) || self.address(framed, lists, says)
+    }
+
+    /// - `words_min`: of how many words an opener must be.
+    fn open_at(
+        &self,
+        at: usize,
+        framed: &mut Framed,
+        lists: Option<&WordLists>,
+        words_min: usize,
+    ) -> bool {
+        let tokens = &framed.tokens;
+        let gerund = longest(&self.gerunds, &tokens[at..]);
+        let opener = longest(&self.openers, &tokens[at..]);
+        let going = longest(&self.going, &tokens[at..]).filter(|count| {
+            let verb = tokens.get(at + count);
+            verb.zip(lists).is_some_and(|(verb, lists)| {
+                lists.verbs.contains(verb) && !self.is_excluded(tokens.get(at + count + 1))
+            })
+        });
+        let usual = gerund
+            .max(opener)
+            .filter(|count| *count >= words_min && !self.is_excluded(tokens.get(at + count)));
+        let Some(count) = usual.or(going) else { return false };
+        if !tokens[at + count..].iter().any(|token| !is_mark(token)) {
+            return false;
+        }
+        framed.frames.push(tokens[at..at + count].join(" "));
+        framed.tokens.drain(at..at + count);
+        if let (true, Some(lists)) = (gerund >= opener && gerund.is_some(), lists)
+            && let Some(verb) = framed.tokens.get_mut(at)
+        {
+            *verb = lists.base(verb);
+        }
+        true
+    }
+
+    fn is_excluded(&self, next: Option<&String>) -> bool {
+        next.is_some_and(|next| self.unless_before.contains(next))
+    }
+
+    /// "Alfred, open the fridge": one word that nobody knows before a comma.
+    fn address(
+        &self,
+        framed: &mut Framed,
+        lists: Option<&WordLists>,
+        says: &dyn Fn(&str) -> bool,
+    ) -> bool {
+        let [name, mark, rest @ ..] = framed.tokens.as_slice() else { return false };
+        let Some(lists) = lists else { return false };
+        let known = lists.verbs.contains(name)
+            || lists.noun_verbs.contains(name)
+            || lists.stop.contains(name)
+            || lists.adverbs.contains(name)
+            || lists.lasting.contains(name)
+            || says(name);
+        if mark != "," || known || !rest.iter().any(|token| !is_mark(token)) {
+            return false;
+        }
+        // What follows is a request of its own, not the rest of a list.
+        if !rest.first().is_some_and(|verb| lists.verbs.contains(verb)) {
+            return false;
+        }
+        framed.frames.push(name.clone());
+        framed.tokens.drain(..2);
+        true
+    }
+
+    /// Takes one closer away.
+    fn close(&self, framed: &mut Framed) -> bool {
+        let tokens = &framed.tokens;
+        let marks = tokens.iter().rev().take_while(|token| is_mark(token)).count();
+        let end = tokens.len() - marks;
+        let count =
+            (1..end).rev().find(|&count| phrase_in(&self.closers, &tokens[end - count..end]));
+        let Some(count) = count else { return false };
+        framed.frames.push(tokens[end - count..end].join(" "));
+        framed.tokens.truncate(end - count);
+        while framed.tokens.last().is_some_and(|token| is_mark(token)) {
+            framed.tokens.pop();
+        }
+        true
+    }
+
+    fn strip_later_clauses(&self, framed: &mut Framed, lists: Option<&WordLists>) {
+        let mut at = 1;
+        while at < framed.tokens.len() {
+            let begins = |token: &String| {
+                is_mark(token) || lists.is_some_and(|lists| lists.cuts.contains(token))
+            };
+            if begins(&framed.tokens[at - 1]) && self.open_at(at, framed, lists, 2) {
+                continue;
+            }
+            if self.fillers.contains(&framed.tokens[at]) {
+                framed.frames.push(framed.tokens.remove(at));
+                continue;
+            }
+            at += 1;
+        }
+    }
+}
+
+/// Other words for what seeds say ("grasp" for "pick up"), where a clause begins. A phrase with an
+/// ellipsis has its second part where the clause ends: "shut … off".
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Verbs(BTreeMap<String, String>);
+
+/// Words in which a slip of one letter is forgiven where a clause begins.
+const SLIP_LETTERS_MIN: usize = 4;
+
+impl Verbs {
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// - `known`: whether a word is in ordinary use, and so no slip.
+    pub(super) fn rewrite(
+        &self,
+        tokens: Vec<String>,
+        lists: &WordLists,
+        known: &dyn Fn(&str) -> bool,
+    ) -> Vec<String> {
+        let mut out = Vec::with_capacity(tokens.len());
+        let mut rest = tokens;
+        loop {
+            let begins = |token: &String| is_mark(token) || lists.cuts.contains(token);
+            let skipped =
+                rest.iter().take_while(|token| begins(token) || lists.joints.contains(*token));
+            let skipped = skipped.count();
+            out.extend(rest.drain(..skipped));
+            if rest.is_empty() {
+                return out;
+            }
+            let end = rest.iter().position(begins).unwrap_or(rest.len());
+            let clause = rest.drain(..end.max(1)).collect();
+            out.extend(self.rewrite_clause(mend_verb(clause, lists, known)));
+        }
+    }
+
+    fn rewrite_clause(&self, clause: Vec<String>) -> Vec<String> {
+        let mut best: Option<(usize, Vec<String>)> = None;
+        let first = clause[0].as_str();
+        let beginning = self.0.range(first.to_owned()..);
+        for (said, meant) in beginning.take_while(|(said, _)| said.starts_with(first)) {
+            let Some((count, words)) = replaced(&clause, said, meant) else { continue };
+            if best.as_ref().is_none_or(|(known, _)| count > *known) {
+                best = Some((count, words));
+            }
+        }
+        best.map_or(clause, |(_, words)| words)
+    }
+}
+
+/// The clause with `meant` in the place of `said`, and how many words that took.
+fn replaced(clause: &[String], said: &str, meant: &str) -> Option<(usize, Vec<String>)> {
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let (head, tail) = said.split_once('…').unwrap_or((said, ""));
+    let (head, tail) = (words(head), words(tail));
+    let rest = clause.strip_prefix(head.as_slice())?;
+    let (new_head, new_tail) = meant.split_once('…').unwrap_or((meant, ""));
+    let mut out = words(new_head);
+    if tail.is_empty() {
+        out.extend(rest.iter().cloned());
+        return Some((head.len(), out));
+    }
+    let between = rest.strip_suffix(tail.as_slice()).filter(|between| !between.is_empty())?;
+    out.extend(between.iter().cloned());
+    out.extend(words(new_tail));
+    Some((head.len() + tail.len(), out))
+}
+
+/// "Opne the fridge": a first word that is in no table, one slip from exactly one common verb.
+fn mend_verb(
+    mut clause: Vec<String>,
+    lists: &WordLists,
+    known: &dyn Fn(&str) -> bool,
+) -> Vec<String> {
+    let word = clause[0].as_str();
+    let listed = lists.verbs.contains(word) || lists.noun_verbs.contains(word);
+    if clause.len() < 2 || word.len() < SLIP_LETTERS_MIN || listed || known(word) {
+        return clause;
+    }
+    let common = lists.common_verbs.iter().filter(|verb| one_slip_apart(word, verb));
+    if let [verb] = common.collect::<Vec<_>>()[..] {
+        clause[0] = verb.clone();
+    }
+    clause
+}
+
+/// How many tokens the longest phrase takes that `tokens` begin with.
+fn longest(phrases: &BTreeSet<String>, tokens: &[String]) -> Option<usize> {
+    (1..=tokens.len().min(PHRASE_WORDS_MAX)).rev().find(|&n| phrase_in(phrases, &tokens[..n]))
+}
+
+/// Words of the longest phrase that is looked for.
+const PHRASE_WORDS_MAX: usize = 8;
+
+fn phrase_in(phrases: &BTreeSet<String>, tokens: &[String]) -> bool {
+    match tokens {
+        [one] => phrases.contains(one),
+        several if several.len() <= PHRASE_WORDS_MAX => phrases.contains(&several.join(" ")),
+        _ => false,
+    }
+}
+
+fn is_mark(token: &str) -> bool {
+    matches!(token, "," | "." | ";")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::tokens;
+
+    fn set(words: &[&str]) -> BTreeSet<String> {
+        words.iter().map(|word| (*word).to_owned()).collect()
+    }
+
+    fn lists() -> WordLists {
+        WordLists {
+            verbs: set(&["open", "pick", "get", "go", "close", "turn", "shut"]),
+            cuts: set(&["and", "then"]),
+            joints: set(&["and", "then"]),
+            common_verbs: set(&["open", "close", "pick"]),
+            ..WordLists::default()
+        }
+    }
+
+    fn stripped(text: &str) -> String {
+        let frames = Frames {
+            openers: set(&["please", "could you", "can you", "ok", "next", "robot"]),
+            gerunds: set(&["would you mind"]),
+            closers: set(&["please", "for me", "thank you"]),
+            fillers: set(&["please"]),
+            going: set(&["go", "go and"]),
+            unless_before: set(&["to"]),
+        };
+        frames.strip(tokens(text), Some(&lists()), &|_| false).tokens.join(" ")
+    }
+
+    #[test]
+    fn frames_are_taken_away_and_requests_stay() {
+        for (said, bare) in [
+            ("could you please open the fridge for me, please?", "open the fridge"),
+            ("ok robot, open the fridge. thank you", "open the fridge"),
+            ("alfred, open the fridge", "open the fridge"),
+            ("would you mind opening the fridge", "open the fridge"),
+            ("open the fridge and can you close it", "open the fridge and close it"),
+            ("go and pick up the mug", "pick up the mug"),
+            ("go get the mug", "get the mug"),
+            ("go close to the sink", "go close to the sink"),
+            ("next to the sink", "next to the sink"),
+            ("next open the fridge", "open the fridge"),
+            ("please", "please"),
+            ("the mug, please", "the mug"),
+        ] {
+            assert_eq!(stripped(said), bare, "{said}");
+        }
+    }
+
+    #[test]
+    fn other_words_for_a_verb_are_read_where_a_clause_begins() {
+        let entries =
+            [("grasp", "pick up"), ("shut off", "turn off"), ("shut … off", "turn … off")];
+        let verbs = Verbs(entries.map(|(a, b)| (a.to_owned(), b.to_owned())).into());
+        let known = |word: &str| !["opne", "clsoe"].contains(&word);
+        for (said, read) in [
+            ("grasp the mug and shut off the lamp", "pick up the mug and turn off the lamp"),
+            ("shut the lamp off", "turn the lamp off"),
+            ("shut the fridge", "shut the fridge"),
+            ("open the grasp", "open the grasp"),
+            ("opne the fridge then clsoe it", "open the fridge then close it"),
+        ] {
+            assert_eq!(verbs.rewrite(tokens(said), &lists(), &known).join(" "), read, "{said}");
+        }
+    }
+}

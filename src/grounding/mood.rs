@@ -1,0 +1,237 @@
+//! Whether an utterance asks for something to be done now. What is asked, told, forbidden, or meant
+//! for another time is never carried out.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::frames::Framed;
+use crate::language::{Mood, WordLists};
+
+/// Words by which a mood is known. Data of a recipe, in lower case; entries may have several words.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Moods {
+    /// Where an utterance begins that asks: "what", "tell me".
+    pub asking: BTreeSet<String>,
+    /// Where an utterance begins, it asks; behind a noun, it tells: "is", "did".
+    pub auxiliaries: BTreeSet<String>,
+    /// As an auxiliary, but only before a pronoun: "do you", "have you".
+    pub auxiliaries_or_verbs: BTreeSet<String>,
+    /// Where an utterance begins that tells: "i", "somebody".
+    pub subjects: BTreeSet<String>,
+    /// Of verbs that do not end in -ed.
+    pub past: BTreeSet<String>,
+    /// Anywhere: it was done, it is told.
+    pub told: BTreeSet<String>,
+    /// Open a part of a sentence in which an auxiliary says nothing of the whole: "that".
+    pub relative: BTreeSet<String>,
+    /// Anywhere: something is not to be done.
+    pub forbidding: BTreeSet<String>,
+    /// The same before a verb in -ing: "stop".
+    pub ending: BTreeSet<String>,
+    /// Anywhere: it depends on something.
+    pub conditions: BTreeSet<String>,
+    /// Anywhere: it is for another time.
+    pub times: BTreeSet<String>,
+    /// Anywhere: more, less or other than one step can say: "all", "or", "except".
+    pub amounts: BTreeSet<String>,
+    /// Phrases with such a word that mean nothing of the kind: "all the way".
+    pub idioms: BTreeSet<String>,
+    /// Where an utterance begins: its order is not that of the words. "Before".
+    pub order_first: BTreeSet<String>,
+    /// The same behind the first word: "after".
+    pub order_later: BTreeSet<String>,
+}
+
+/// Words of a duration, such as "a few seconds".
+const DURATION_WORDS: usize = 3;
+
+impl Moods {
+    /// - `text`: as said, for its question mark.
+    pub(super) fn of(&self, text: &str, framed: &Framed, lists: &WordLists) -> Option<Mood> {
+        let tokens: Vec<&str> = framed.tokens.iter().map(String::as_str).collect();
+        let first = tokens.iter().position(|token| !is_mark(token))?;
+        let tokens = &tokens[first..];
+        let found = |phrases: &BTreeSet<String>| anywhere(phrases, tokens);
+        let ended = tokens.windows(2).find(|two| {
+            self.ending.contains(two[0]) && two[1].ends_with("ing") && lists.base(two[1]) != two[1]
+        });
+        if let Some(word) = found(&self.forbidding).or(ended.map(|two| two.join(" "))) {
+            return Some(Mood::Forbidden { word });
+        }
+        if let Some(word) = self.asks(text, framed, tokens) {
+            return Some(Mood::Asked { word });
+        }
+        if let Some(word) = self.tells(tokens, lists) {
+            return Some(Mood::Told { word });
+        }
+        if let Some(word) = found(&self.conditions) {
+            return Some(Mood::Conditional { word });
+        }
+        if let Some(word) = found(&self.times) {
+            return Some(Mood::Later { word });
+        }
+        let lasts = |at: usize| {
+            tokens[at + 1..].iter().take(DURATION_WORDS).any(|next| lists.lasting.contains(*next))
+        };
+        let reordered = tokens.iter().enumerate().find(|(at, token)| match at {
+            0 => self.order_first.contains(**token),
+            // "After a few seconds" is how long, which a parser judges.
+            _ => self.order_later.contains(**token) && !lasts(*at),
+        });
+        reordered.map(|(_, word)| Mood::Reordered { word: (*word).to_owned() })
+    }
+
+    /// The words that ask for more, less or other than one step can say, if there are any.
+    ///
+    /// What only describes a landmark does not count: "between the TWO vases".
+    pub(super) fn amounts(&self, tokens: &[String], lists: &WordLists) -> Vec<String> {
+        let tokens: Vec<&str> = tokens.iter().map(String::as_str).collect();
+        let aside = |at: usize| {
+            let mut before = tokens[..at].iter().rev();
+            let before =
+                before.find(|word| !lists.determiners.contains(**word) && **word != "other");
+            before.is_some_and(|word| {
+                // "Mug number two".
+                if *word == "number" {
+                    return true;
+                }
+                lists.stop.contains(*word)
+                    && !lists.onto.contains(*word)
+                    && !lists.inside.contains(*word)
+                    && !lists.cuts.contains(*word)
+                    && !lists.verb_particles.contains(*word)
+            })
+        };
+        let from = |at: usize| {
+            let phrase = phrase_from(&self.amounts, &tokens[at..])?;
+            // "For a few seconds" is how long, which a parser judges.
+            let lasts = tokens.get(at + 1).is_some_and(|next| lists.lasting.contains(*next));
+            let idiom = lasts || phrase_from(&self.idioms, &tokens[at..]).is_some();
+            (!idiom && !aside(at)).then(|| phrase.clone())
+        };
+        let mut found: Vec<String> = Vec::new();
+        for phrase in (0..tokens.len()).filter_map(from) {
+            if !found.contains(&phrase) {
+                found.push(phrase);
+            }
+        }
+        found
+    }
+
+    /// Takes away why something is asked for, where it is said last and behind a mark: "close the
+    /// fridge, it is still open". What forbids or limits the request stays.
+    pub(super) fn strip_reason(&self, framed: &mut Framed) {
+        let tokens: Vec<&str> = framed.tokens.iter().map(String::as_str).collect();
+        let Some(mark) = tokens.iter().rposition(|token| is_mark(token)) else { return };
+        let [first, rest @ ..] = &tokens[mark + 1..] else { return };
+        let contracted = first.split_once('\'').is_some_and(|(word, verb)| {
+            self.subjects.contains(word) && matches!(verb, "s" | "re" | "m" | "ve")
+        });
+        let told = contracted
+            || (self.subjects.contains(*first)
+                && rest.first().is_some_and(|word| self.auxiliaries.contains(*word)));
+        let says = [&self.forbidding, &self.conditions, &self.times, &self.amounts];
+        if mark == 0 || !told || says.iter().any(|list| anywhere(list, &tokens[mark..]).is_some()) {
+            return;
+        }
+        framed.frames.push(tokens[mark + 1..].join(" "));
+        framed.tokens.truncate(mark);
+    }
+
+    /// Whether a single word says anything of a mood.
+    pub(super) fn has(&self, word: &str) -> bool {
+        [&self.asking, &self.told, &self.forbidding, &self.conditions, &self.times, &self.amounts]
+            .iter()
+            .any(|list| list.contains(word))
+    }
+
+    fn asks(&self, text: &str, framed: &Framed, tokens: &[&str]) -> Option<String> {
+        if let Some(phrase) = phrase_from(&self.asking, tokens) {
+            return Some(phrase.clone());
+        }
+        let (first, second) = (tokens[0], tokens.get(1));
+        let subject = second.is_some_and(|word| self.subjects.contains(*word));
+        if self.auxiliaries.contains(first)
+            || (self.auxiliaries_or_verbs.contains(first) && subject)
+        {
+            return Some(first.to_owned());
+        }
+        // "Open the fridge, will you?" was asked politely; of a bare sentence nobody knows.
+        let polite = !framed.frames.is_empty();
+        (text.contains('?') && !polite).then(|| "?".to_owned())
+    }
+
+    fn tells(&self, tokens: &[&str], lists: &WordLists) -> Option<String> {
+        let first = tokens[0];
+        let contracted =
+            first.split_once('\'').is_some_and(|(word, _)| self.subjects.contains(word));
+        if self.subjects.contains(first) || contracted {
+            return Some(first.to_owned());
+        }
+        if let Some(word) = anywhere(&self.told, tokens) {
+            return Some(word);
+        }
+        let is_past = |word: &str| {
+            self.past.contains(word) || (word.ends_with("ed") && is_past_of(word, lists))
+        };
+        let is_verb = |word: &str| lists.verbs.contains(word) || lists.noun_verbs.contains(word);
+        if is_past(first) && !is_verb(first) {
+            return Some(first.to_owned());
+        }
+        let gerund = first.ends_with("ing") && lists.base(first) != first;
+        if is_verb(first) {
+            return None;
+        }
+        for (at, token) in tokens.iter().enumerate() {
+            // What follows a mark, or describes a thing, is another part of the sentence.
+            if self.relative.contains(*token) || (is_mark(token) && !gerund) {
+                return None;
+            }
+            let determined = at > 0 && lists.determiners.contains(tokens[at - 1]);
+            // Nobody asks for something with an article first.
+            let named_first = lists.determiners.contains(first);
+            if at > 0 && is_verb(token) && !gerund && !determined && !is_past(token) && !named_first
+            {
+                return None;
+            }
+            let named_first = named_first || at == 1;
+            let auxiliary = self.auxiliaries.contains(*token);
+            if at > 0 && (auxiliary || (named_first && !gerund && !determined && is_past(token))) {
+                return Some((*token).to_owned());
+            }
+        }
+        None
+    }
+}
+
+/// "Washed", "placed", "dropped": of a verb that is known.
+fn is_past_of(word: &str, lists: &WordLists) -> bool {
+    let Some(stem) = word.strip_suffix("ed") else { return false };
+    let doubled = stem.char_indices().last().map_or("", |(end, _)| &stem[..end]);
+    [stem.to_owned(), format!("{stem}e"), doubled.to_owned()]
+        .iter()
+        .any(|form| lists.verbs.contains(form) || lists.noun_verbs.contains(form))
+}
+
+fn is_mark(token: &str) -> bool {
+    matches!(token, "," | "." | ";")
+}
+
+/// The longest phrase that the tokens begin with.
+fn phrase_from<'p>(phrases: &'p BTreeSet<String>, tokens: &[&str]) -> Option<&'p String> {
+    let first = *tokens.first()?;
+    let beginning = phrases.range(first.to_owned()..).take_while(|p| p.starts_with(first));
+    beginning.filter(|phrase| begins_with(tokens, phrase)).max_by_key(|phrase| phrase.len())
+}
+
+fn begins_with(tokens: &[&str], phrase: &str) -> bool {
+    let mut tokens = tokens.iter();
+    phrase.split(' ').all(|word| tokens.next() == Some(&word))
+}
+
+/// The first phrase that stands anywhere in the tokens.
+fn anywhere(phrases: &BTreeSet<String>, tokens: &[&str]) -> Option<String> {
+    (0..tokens.len()).find_map(|at| phrase_from(phrases, &tokens[at..])).cloned()
+}

@@ -1,0 +1,168 @@
+//! Carrying a reading out on a copy of the scene: step by step, with what must come first, and
+//! without what holds already.
+
+use super::chosen::Chosen;
+use super::combine::{Ground, Offer, Verdict};
+use crate::language::{Program, Step};
+use crate::limits::PROGRAM_STEPS_MAX;
+use crate::world::Domain;
+
+/// Steps taken unasked before one step that needs them.
+const UNASKED_STEPS_MAX: usize = 3;
+
+/// What was carried out so far, step by step.
+pub(super) struct Done {
+    pub steps: Vec<Step>,
+    pub bindings: Vec<Vec<String>>,
+    pub chosen: Vec<Vec<Option<String>>>,
+}
+
+impl Done {
+    pub(super) fn push(&mut self, step: Step, bound: Vec<String>, on: Vec<Option<String>>) {
+        self.steps.push(step);
+        self.bindings.push(bound);
+        self.chosen.push(on);
+    }
+}
+
+impl<D: Domain> Ground<'_, D> {
+    /// Carries the steps out on the copy of the scene.
+    ///
+    /// - `after_lesson`: whether a clause before this one was read as a lesson.
+    /// - errors: [`Verdict::Forbidden`], its step counted over the whole program.
+    pub(super) fn run(
+        &self,
+        scene: &mut D::Scene,
+        done: &mut Done,
+        offer: &Offer<'_>,
+        after_lesson: bool,
+        program: &Program,
+        chosen: &Chosen,
+    ) -> Result<(), Verdict> {
+        let (domain, task) = (self.moment.domain, self.moment.task);
+        let before = done.steps.len();
+        let contradicted = |scene: &D::Scene, from: usize| {
+            let rest = Program { steps: program.steps[from..].to_vec() };
+            if !self.context.execution.polarity {
+                return None;
+            }
+            let (step, reason) = domain.contradiction(scene, &offer.clause.words, &rest)?;
+            let step = (before + from + step) as u32;
+            Some(Verdict::Forbidden { step, reason, mendable: false })
+        };
+        if let Some(contradiction) = contradicted(scene, 0) {
+            return Err(contradiction);
+        }
+        // A lesson is for what comes of it: what holds already need not be done again.
+        let by_effect = self.context.execution.effects && !offer.seed;
+        let mut held_already = None;
+        if let (true, Some(reason)) = (by_effect, self.is_done(scene, program, chosen)) {
+            let step = (before + program.steps.len() - 1) as u32;
+            return Err(Verdict::Forbidden { step, reason, mendable: false });
+        }
+        for (index, step) in program.steps.iter().enumerate() {
+            let refused = |reason, mendable| Verdict::Forbidden {
+                step: (before + index) as u32,
+                reason,
+                mendable,
+            };
+            if done.steps.len() >= PROGRAM_STEPS_MAX {
+                return Err(refused("the program is too long".to_owned(), false));
+            }
+            domain.signature().check(step).map_err(|reason| refused(reason, false))?;
+            // What a lesson turns on and off again may be on when it begins.
+            if by_effect && self.starts_on(scene, program, index) {
+                held_already = Some(refused("it is on already".to_owned(), false));
+                continue;
+            }
+            let mut unasked = 0;
+            let on = chosen.on(step);
+            let bound = loop {
+                let refusal = match domain.step_on(scene, task, step, &on) {
+                    Ok(bound) => break Some(bound),
+                    Err(refusal) => refusal,
+                };
+                // "Wash the apple and pick it up": the lesson did.
+                if after_lesson && self.context.execution.effects && refusal.done {
+                    break None;
+                }
+                if by_effect && refusal.done {
+                    held_already = Some(refused(refusal.reason, false));
+                    break None;
+                }
+                // What is in the fridge across the room takes two: going there and opening it.
+                let roles = &domain.lexicon(self.context.edition).roles;
+                let means = roles.goes(&step.operator) || roles.is_door(&step.operator);
+                // How the lesson got there need not be how one gets there here.
+                let accounts = self.context.execution.accounting.is_some();
+                let near = (offer.open && !(accounts && offer.seed)) || by_effect;
+                if near && program.steps.len() > 1 && means && refusal.first.is_none() {
+                    break None;
+                }
+                let mendable = refusal.first.is_some();
+                let first = refusal.first.filter(|_| self.context.execution.approach);
+                let Some(first) = first.filter(|_| unasked < UNASKED_STEPS_MAX) else {
+                    return Err(refused(refusal.reason, mendable));
+                };
+                let bound = domain
+                    .step_on(scene, task, &first, &refusal.first_on)
+                    .map_err(|e| refused(e.reason, false))?;
+                done.push(first, bound, refusal.first_on);
+                unasked += 1;
+                // What was too far away to contradict the words is near now.
+                if let Some(contradiction) = contradicted(scene, index) {
+                    return Err(contradiction);
+                }
+            };
+            if let Some(bound) = bound {
+                done.push(step.clone(), bound, on);
+            }
+        }
+        // Going there is not what it was for.
+        let roles = &domain.lexicon(self.context.edition).roles;
+        let only_went = done.steps[before..].iter().all(|step| roles.goes(&step.operator))
+            && !program.steps.iter().all(|step| roles.goes(&step.operator));
+        match held_already.filter(|_| only_went) {
+            Some(nothing_left) => Err(nothing_left),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a step of a lesson is the first of an even number that work one thing, and it is on.
+    fn starts_on(&self, scene: &D::Scene, program: &Program, index: usize) -> bool {
+        let roles = &self.moment.domain.lexicon(self.context.edition).roles;
+        let step = &program.steps[index];
+        let works = !roles.goes(&step.operator)
+            && !roles.takes(&step.operator)
+            && !roles.puts(&step.operator)
+            && !roles.is_door(&step.operator);
+        let same = program.steps.iter().filter(|other| *other == step).count();
+        let first = program.steps.iter().position(|other| other == step) == Some(index);
+        works && first && same % 2 == 0 && self.moment.domain.is_on(scene, step)
+    }
+
+    /// Why nothing is left to do of a lesson that only takes something somewhere: it is there.
+    fn is_done(&self, scene: &D::Scene, program: &Program, chosen: &Chosen) -> Option<String> {
+        let domain = self.moment.domain;
+        let roles = &domain.lexicon(self.context.edition).roles;
+        let moves = |step: &Step| {
+            roles.goes(&step.operator)
+                || roles.takes(&step.operator)
+                || roles.puts(&step.operator)
+                || roles.is_door(&step.operator)
+        };
+        let mut puts = program.steps.iter().filter(|step| roles.puts(&step.operator));
+        let last = puts.next_back()?;
+        let taken_after =
+            program.steps.iter().rev().take_while(|s| *s != last).any(|s| roles.takes(&s.operator));
+        if !program.steps.iter().all(moves) || puts.next().is_some() || taken_after {
+            return None;
+        }
+        let on = chosen.on(last);
+        let refusal = domain.step_on(&mut scene.clone(), self.moment.task, last, &on).err()?;
+        let goal = last.args.last()?;
+        refusal
+            .done
+            .then(|| format!("nothing is left to do: the {} is at the {goal}", last.args[0]))
+    }
+}
