@@ -14,6 +14,9 @@ pub(super) struct Account<'a> {
     pub clause: &'a Clause,
 }
 
+/// Words between clauses that say when.
+const ORDER: [&str; 3] = ["before", "after", "while"];
+
 /// What stands where a thing is named.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Head<'a> {
@@ -207,7 +210,9 @@ impl<'a> Account<'a> {
     /// "The mug and the banana", "and sing": behind a joining word.
     fn unknown_joined(&self) -> Option<&'a str> {
         let verb = self.grammar().main_verb(self.words()).map(|verb| verb.at);
-        let mut joined = self.texts().filter(|(_, word)| self.lists.cuts.contains(*word));
+        // "Before opening it" and "after a moment" say when, and nothing more to do.
+        let joins = |word: &str| self.lists.cuts.contains(word) && !ORDER.contains(&word);
+        let mut joined = self.texts().filter(|(_, word)| joins(word));
         joined.find_map(|(at, word)| match (self.head(at + 1, false), self.words().get(at + 1)) {
             (Head::Unknown(word), _) => Some(word),
             (_, Some(Word::Text(next))) if self.is_content(next) => Some(next.as_str()),

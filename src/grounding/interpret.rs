@@ -6,7 +6,7 @@ use super::resolver::resolve;
 use super::settings::{Abstraction, Execution};
 use crate::language::{
     Accounted, Answer, Clause, Discarded, Evidence, Grammar, LiftedArg, LiftedProgram, LiftedStep,
-    LiftedUtterance, Mention, Near, Outcome, Roles, Symbol, Use, Utterance, Word, WordLists,
+    LiftedUtterance, Mention, Mood, Near, Outcome, Roles, Symbol, Use, Utterance, Word, WordLists,
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
 use crate::parser::{Parse, Scored, SemanticParser};
@@ -35,11 +35,17 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     /// a reranker the nearest feasible candidate wins. Nothing is carried out here.
     pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
-        if heard.abstracted.mood.is_some() {
-            return heard.not_asked(moment);
-        }
+        let lessons_alone = match &heard.abstracted.mood {
+            None => false,
+            Some(mood) if heard.may_be_told(mood) => true,
+            Some(_) => return heard.not_asked(moment),
+        };
         let mut candidates = Vec::new();
-        for ways in heard.deciding() {
+        for mut ways in heard.deciding() {
+            if lessons_alone {
+                ways.retain(|way| way.len() == 1);
+                ways.iter_mut().flatten().for_each(|offers| offers.retain(|offer| !offer.seed));
+            }
             let found = self.ground(moment, &heard, &ways);
             let runs = !feasible(&found).is_empty();
             let decided = self.accounts() && found.iter().any(is_final);
@@ -67,6 +73,9 @@ impl<P: SemanticParser> Interpreter<'_, P> {
             }
             _ => (feasible.first().copied(), 0),
         };
+        if lessons_alone && chosen.is_none() {
+            return heard.not_asked(moment);
+        }
         // Candidates are sorted: the first forbidden one is the best guess at what was meant.
         let is_forbidden = |c: &&Candidate| matches!(c.verdict, Verdict::Forbidden { .. });
         // A reading that passes words over says that they were not understood, not that the world
@@ -347,6 +356,10 @@ impl Heard<'_> {
             let mut unexplained = Vec::new();
             for part in &self.parts {
                 let Some(verb) = grammar.main_verb(&part.lifted().words) else { continue };
+                // "Wait" is nothing to do.
+                if grammar.lists.lasting.contains(&verb.word) {
+                    continue;
+                }
                 let own = part.offers(self.seeds);
                 let own = own.first().filter(|own| own.seed);
                 let step = own.and_then(|own| own.program.steps.first());
@@ -363,6 +376,13 @@ impl Heard<'_> {
                 offer.dropped.extend(unexplained);
             }
         }
+    }
+
+    /// Whether a lesson may answer an utterance of this mood: one with exactly its words, or a long
+    /// instruction of which only a part waits for something ("…, and take it out when it is done").
+    fn may_be_told(&self, mood: &Mood) -> bool {
+        let waits = matches!(mood, Mood::Conditional { .. } | Mood::Reordered { .. });
+        waits && (self.whole.literal() || self.parts.len() >= LONG_CLAUSES_MIN)
     }
 
     /// The answer to what asks for nothing: it names the words that say so.
@@ -482,6 +502,8 @@ fn taught(parse: &Parse, number: u32) -> Option<&LiftedUtterance> {
 
 /// The distance of a way that a verb of carrying gives: not as said, and sure.
 const CARRIED_AT: f32 = 0.1;
+/// How many clauses a long instruction has.
+const LONG_CLAUSES_MIN: usize = 3;
 /// How far a reading is that is as good as said.
 const SAID_WITHIN: f32 = 0.02;
 
