@@ -37,10 +37,6 @@ impl<'a> Account<'a> {
     /// recorded landmarks have no name here.
     pub fn of_primitive(&self, operator: &Symbol) -> Vec<String> {
         let mut left = Vec::new();
-        let works = !self.roles.goes(operator)
-            && !self.roles.takes(operator)
-            && !self.roles.puts(operator)
-            && !self.roles.is_door(operator);
         left.extend(match self.roles.goes(operator) {
             true => self.unknown_way(),
             false => self.unknown_object(),
@@ -52,7 +48,7 @@ impl<'a> Account<'a> {
         if self.roles.is_door(operator) {
             left.extend(self.unknown_tool());
         }
-        if works {
+        if self.roles.works(operator) {
             left.extend(self.towards());
             left.extend(self.degrees());
         }
@@ -74,17 +70,17 @@ impl<'a> Account<'a> {
     /// The words that a clause without a deed passes over: a way to what nobody knows.
     pub fn of_idle(&self) -> Vec<String> {
         let ways = self.texts().filter(|(_, word)| self.lists.destination.contains(*word));
-        let unknown = ways.filter_map(|(at, _)| match self.head(at + 1, false) {
-            Head::Unknown(word) => Some(word),
-            _ => None,
-        });
+        let unknown = ways.filter_map(|(at, _)| self.unknown_at(at + 1, false));
         owned(unknown)
     }
 
     /// "2 apples", "20 %": no step has a number.
     fn numbers(&self) -> Option<&'a str> {
         // "For 2 seconds" is how long, which a parser judges.
-        let lasts = |at: usize| matches!(self.words().get(at + 1), Some(Word::Text(next)) if self.lists.lasting.contains(next));
+        let lasts = |at: usize| match self.words().get(at + 1) {
+            Some(Word::Text(next)) => self.lists.lasting.contains(next),
+            _ => false,
+        };
         let number = |(at, word): &(usize, &str)| {
             word.bytes().all(|byte| byte.is_ascii_digit()) && !lasts(*at)
         };
@@ -94,10 +90,7 @@ impl<'a> Account<'a> {
     /// "Open the fridge with the hammer".
     fn unknown_tool(&self) -> Option<&'a str> {
         let with = self.texts().find(|(_, word)| *word == "with")?;
-        match self.head(with.0 + 1, false) {
-            Head::Unknown(word) => Some(word),
-            _ => None,
-        }
+        self.unknown_at(with.0 + 1, false)
     }
 
     /// "Turn the lamp to the left": what is only switched goes nowhere. "Next to the cup" and "to the
@@ -165,10 +158,7 @@ impl<'a> Account<'a> {
     }
 
     fn unknown_object(&self) -> Option<&'a str> {
-        match self.head(self.object_at(), true) {
-            Head::Unknown(word) => Some(word),
-            _ => None,
-        }
+        self.unknown_at(self.object_at(), true)
     }
 
     /// Of a way, what stands behind the first word that says where to; of "face the …" the object.
@@ -178,10 +168,7 @@ impl<'a> Account<'a> {
             *at > verb && (self.lists.toward.contains(*word) || *word == "on" || *word == "in")
         });
         let from = ways.next().map_or_else(|| self.object_at(), |(at, _)| at + 1);
-        match self.head(from, false) {
-            Head::Unknown(word) => Some(word),
-            _ => None,
-        }
+        self.unknown_at(from, false)
     }
 
     /// Of a putting, what stands behind the first preposition that a thing follows.
@@ -239,6 +226,14 @@ impl<'a> Account<'a> {
             && !lists.noun_verbs.contains(word)
             && !self.accounting.harmless.contains(word)
             && !self.grammar().is_adjective(word)
+    }
+
+    /// The noun from `at` on that names nothing known, if that is what stands there.
+    fn unknown_at(&self, at: usize, object: bool) -> Option<&'a str> {
+        match self.head(at, object) {
+            Head::Unknown(word) => Some(word),
+            Head::Known | Head::Nothing => None,
+        }
     }
 
     /// What the words from `at` on name: the last noun before a word of another sort.

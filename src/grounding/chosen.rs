@@ -79,13 +79,10 @@ impl<D: Domain> Ground<'_, D> {
             let pronoun = offer.clause.mentions.get(place).is_some_and(|m| m.pronoun);
             let acts_on = |kind: &&Symbol| program.steps.iter().any(|s| s.args.contains(kind));
             let kind = kinds.iter().find(acts_on);
-            let Some(kind) = kind.filter(|kind| !pronoun && !chosen.0.contains_key(*kind)) else {
+            // The first of its kind is the one: "the bowl beside the other bowl".
+            let Some(kind) = kind.filter(|kind| !pronoun && !seen.contains(kind)) else {
                 continue;
             };
-            // The first of its kind is the one: "the bowl beside the other bowl".
-            if seen.contains(kind) {
-                continue;
-            }
             seen.push(kind.clone());
             let mut pointing =
                 pointing(domain, self.context.edition, lists, offer.clause, types, place, program);
@@ -125,13 +122,9 @@ fn switched<'s>(
     program: &Program,
 ) -> Option<&'s str> {
     let [step] = program.steps.as_slice() else { return None };
-    let roles = &lexicon.roles;
-    let moves = roles.goes(&step.operator)
-        || roles.takes(&step.operator)
-        || roles.puts(&step.operator)
-        || roles.is_door(&step.operator);
+    let works = lexicon.roles.works(&step.operator);
     let grammar = Grammar { lists, adjectives: &lexicon.adjectives };
-    let verb = grammar.main_verb(&offer.clause.lifted.words).filter(|_| !moves && offer.seed)?;
+    let verb = grammar.main_verb(&offer.clause.lifted.words).filter(|_| works && offer.seed)?;
     match verb.particle.as_str() {
         "off" => Some("on"),
         "on" => Some("off"),

@@ -99,7 +99,6 @@ pub fn combine<D: Domain>(
 ) -> Vec<Candidate> {
     let start = Partial {
         scene: moment.scene.clone(),
-        literal: true,
         candidate: Candidate {
             program: Program { steps: Vec::new() },
             distance: 0.0,
@@ -123,8 +122,6 @@ pub fn combine<D: Domain>(
 /// The first clauses of a combination, and the scene they lead to.
 pub(super) struct Partial<S> {
     pub scene: S,
-    /// Whether every clause so far was read as one primitive.
-    pub literal: bool,
     pub candidate: Candidate,
 }
 
@@ -142,8 +139,9 @@ fn extend<D: Domain>(
             return;
         }
         let steps = &whole.program.steps;
-        let literal = ground.context.lists.is_some() && partial.literal;
-        let reason = match literal {
+        // Whether every clause was read as one primitive.
+        let spelled_out = ground.context.lists.is_some() && whole.seed;
+        let reason = match spelled_out {
             true if purpose::undoes_itself(roles, steps) => Some(
                 "it would be taken again from where it was put, so it was put there for \
                  something that is not known",
@@ -440,7 +438,7 @@ impl<D: Domain> Ground<'_, D> {
         let so_far = &partial.candidate;
         let mut scene = partial.scene.clone();
         let mut steps = so_far.program.steps.clone();
-        let verdict = match (so_far.verdict.clone(), filled.missing) {
+        let mut verdict = match (so_far.verdict.clone(), filled.missing) {
             (Verdict::Runs { .. }, Some(Missing::Slot { reason })) => Verdict::Unfilled { reason },
             (Verdict::Runs { .. }, Some(Missing::Meaning { step, reason })) => {
                 let step = (steps.len() + step) as u32;
@@ -461,7 +459,6 @@ impl<D: Domain> Ground<'_, D> {
             }
             (failed, _) => failed,
         };
-        let mut verdict = verdict;
         if !matches!(verdict, Verdict::Runs { .. }) {
             // The scene stays as it was before the clause: none of it will be carried out.
             scene = partial.scene.clone();
@@ -490,8 +487,7 @@ impl<D: Domain> Ground<'_, D> {
             literal: so_far.literal && offer.is_literal(),
             left_over: so_far.left_over.clone(),
         };
-        let literal = partial.literal && offer.seed;
-        Partial { scene, literal, candidate }
+        Partial { scene, candidate }
     }
 }
 

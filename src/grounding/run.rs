@@ -132,25 +132,19 @@ impl<D: Domain> Ground<'_, D> {
     fn starts_on(&self, scene: &D::Scene, program: &Program, index: usize) -> bool {
         let roles = &self.moment.domain.lexicon(self.context.edition).roles;
         let step = &program.steps[index];
-        let works = !roles.goes(&step.operator)
-            && !roles.takes(&step.operator)
-            && !roles.puts(&step.operator)
-            && !roles.is_door(&step.operator);
         let same = program.steps.iter().filter(|other| *other == step).count();
         let first = program.steps.iter().position(|other| other == step) == Some(index);
-        works && first && same % 2 == 0 && self.moment.domain.is_on(scene, step)
+        roles.works(&step.operator)
+            && first
+            && same % 2 == 0
+            && self.moment.domain.is_on(scene, step)
     }
 
     /// Why nothing is left to do of a lesson that only takes something somewhere: it is there.
     fn is_done(&self, scene: &D::Scene, program: &Program, chosen: &Chosen) -> Option<String> {
         let domain = self.moment.domain;
         let roles = &domain.lexicon(self.context.edition).roles;
-        let moves = |step: &Step| {
-            roles.goes(&step.operator)
-                || roles.takes(&step.operator)
-                || roles.puts(&step.operator)
-                || roles.is_door(&step.operator)
-        };
+        let moves = |step: &Step| !roles.works(&step.operator);
         let mut puts = program.steps.iter().filter(|step| roles.puts(&step.operator));
         let last = puts.next_back()?;
         let taken_after =

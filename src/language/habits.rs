@@ -58,6 +58,14 @@ impl Roles {
         self.putting.as_ref() == Some(operator)
     }
 
+    /// Working its argument, as a switch is worked: none of the other parts.
+    pub fn works(&self, operator: &Symbol) -> bool {
+        !self.goes(operator)
+            && !self.takes(operator)
+            && !self.puts(operator)
+            && !self.is_door(operator)
+    }
+
     pub fn is_door(&self, operator: &Symbol) -> bool {
         self.doors.contains(operator)
     }
