@@ -379,10 +379,15 @@ impl Heard<'_> {
     }
 
     /// Whether a lesson may answer an utterance of this mood: one with exactly its words, or a long
-    /// instruction of which only a part waits for something ("…, and take it out when it is done").
+    /// instruction of which only a later part waits for something ("…, and take it out when it is
+    /// done"). "If it is dirty, take it, wash it and put it back" waits from the beginning.
     fn may_be_told(&self, mood: &Mood) -> bool {
-        let waits = matches!(mood, Mood::Conditional { .. } | Mood::Reordered { .. });
-        waits && (self.whole.literal() || self.parts.len() >= LONG_CLAUSES_MIN)
+        let (Mood::Conditional { word } | Mood::Reordered { word }) = mood else { return false };
+        let first = self.parts.first().map(|part| part.readings[0].0.words.as_slice());
+        let waits_later = first.is_some_and(|words| {
+            word.split(' ').all(|waits| !words.iter().any(|said| said == waits))
+        });
+        self.whole.literal() || (waits_later && self.parts.len() >= LONG_CLAUSES_MIN)
     }
 
     /// The answer to what asks for nothing: it names the words that say so.

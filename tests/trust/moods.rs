@@ -351,6 +351,23 @@ fn what_has_a_condition_is_not_done() {
     nothing_is_done("conditional", CONDITIONAL);
 }
 
+/// A long instruction that waits from its beginning is no lesson's, however near that is.
+#[test]
+fn a_long_request_that_waits_from_its_beginning_is_not_done() {
+    let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
+    let said = [
+        "if the potato is dirty, pick it up, wash it and put it on the counter",
+        "when i come home, pick up the potato, wash it and put it on the table",
+        "once the bell rings, take the potato, wash it, and put it down",
+        "unless i call, pick up the potato, wash the potato and put the potato on the counter",
+        "wash the potato when i say so, put it on the counter and open the fridge",
+        "wash the potato when i say so, turn off the faucet and pick it up",
+        "wash the potato if it is dirty, turn on the faucet, and pick it up",
+        "put the potato in the sink when i say so, wash it and pick it up",
+    ];
+    talk.declines("waiting from the beginning", &said.map(str::to_owned));
+}
+
 #[test]
 fn what_is_for_later_is_not_done() {
     nothing_is_done("later", LATER);
