@@ -3,7 +3,9 @@ use unicode_normalization::UnicodeNormalization;
 use super::frames::Framed;
 use super::names::Names;
 use super::settings::{Abstraction, Split};
-use crate::language::{Clause, Grammar, Mention, Mood, Utterance, Word, WordLists, tokens};
+use crate::language::{
+    Clause, Grammar, Mention, Mood, Utterance, Word, WordLists, is_mark, tokens,
+};
 use crate::limits::{CLAUSES_MAX, MENTIONS_MAX};
 use crate::world::Lexicon;
 
@@ -348,10 +350,6 @@ fn clause<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Clause {
         }
     }
     out
-}
-
-fn is_mark(token: &str) -> bool {
-    matches!(token, "," | "." | ";")
 }
 
 fn cuts(piece: &Piece, split: Split) -> bool {

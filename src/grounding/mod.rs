@@ -8,6 +8,7 @@ mod accounting;
 mod arguments;
 #[cfg(test)]
 pub(crate) mod bench;
+mod carrying;
 mod chosen;
 mod combine;
 mod fill;
@@ -25,6 +26,7 @@ mod run;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod verbs;
 
 pub use abstractor::{Abstracted, Abstractor, without_locations};
 pub use combine::{Candidate, Verdict};

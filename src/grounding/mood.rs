@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::frames::Framed;
-use crate::language::{Mood, WordLists};
+use crate::language::{Mood, WordLists, is_mark};
 
 /// Words by which a mood is known. Data of a recipe, in lower case; entries may have several words.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -213,10 +213,6 @@ fn is_past_of(word: &str, lists: &WordLists) -> bool {
     [stem.to_owned(), format!("{stem}e"), doubled.to_owned()]
         .iter()
         .any(|form| lists.verbs.contains(form) || lists.noun_verbs.contains(form))
-}
-
-fn is_mark(token: &str) -> bool {
-    matches!(token, "," | "." | ";")
 }
 
 /// The longest phrase that the tokens begin with.

@@ -1,6 +1,6 @@
 //! Which of several things of a kind the words of a clause mean.
 
-use crate::language::{Clause, Mention, Program, Symbol, Word, WordLists};
+use crate::language::{Clause, Program, Symbol, Word, WordLists};
 use crate::world::{Domain, Edition, Lexicon, Pointing};
 
 /// Ordinals, from the first.
@@ -140,17 +140,7 @@ fn where_it_is(
         _ => false,
     };
     let mention = clause.mentions.get(next).filter(|mention| said && !mention.pronoun)?;
-    Some(usual(lexicon, mention, types.get(next)?))
-}
-
-/// The types that people mean by a name often enough: one use in fifteen. "In the sink" is not on
-/// the counter that some call so.
-fn usual(lexicon: &Lexicon, mention: &Mention, kinds: &[Symbol]) -> Vec<Symbol> {
-    let Some(meanings) = lexicon.names.get(&mention.surface) else { return kinds.to_vec() };
-    let all: u32 = meanings.iter().map(|meaning| meaning.count).sum();
-    let rare = |kind: &&Symbol| {
-        let own = meanings.iter().find(|meaning| meaning.kind == **kind);
-        own.is_some_and(|own| own.count * 15 < all)
-    };
-    kinds.iter().filter(|kind| !rare(kind)).cloned().collect()
+    // "In the sink" is not on the counter that some call so.
+    let usual = |kind: &&Symbol| !lexicon.rarely_means(&mention.surface, kind);
+    Some(types.get(next)?.iter().filter(usual).cloned().collect())
 }

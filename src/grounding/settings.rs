@@ -2,8 +2,9 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::frames::{Frames, Verbs};
+use super::frames::Frames;
 use super::mood::Moods;
+use super::verbs::Verbs;
 use crate::language::WordLists;
 
 /// How an utterance becomes lifted clauses. Everything is off in the recipe `paper`.

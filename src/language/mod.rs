@@ -22,4 +22,4 @@ pub use lists::WordLists;
 pub use program::{Program, ProgramError, Step};
 pub use signature::{Operator, Signature};
 pub use symbol::Symbol;
-pub use utterance::{Utterance, UtteranceError, tokens};
+pub use utterance::{Utterance, UtteranceError, is_mark, tokens};

@@ -94,6 +94,11 @@ impl fmt::Display for Utterance {
     }
 }
 
+/// Whether a token of [`tokens`] is a clause mark.
+pub fn is_mark(token: &str) -> bool {
+    matches!(token, "," | "." | ";")
+}
+
 fn is_word(token: &str) -> bool {
     token.chars().any(char::is_alphanumeric)
 }

@@ -24,6 +24,24 @@ pub struct Lexicon {
     pub roles: Roles,
 }
 
+impl Lexicon {
+    /// Whether fewer than one in fifteen uses of the name mean this kind ("bowl" for a cup).
+    pub fn rarely_means(&self, surface: &str, kind: &Symbol) -> bool {
+        let meanings = self.names.get(surface).or_else(|| {
+            let (words, last) = surface.rsplit_once(' ').unwrap_or(("", surface));
+            let singular = match self.plurals.get(last) {
+                Some(singular) => singular.as_str(),
+                None => last.strip_suffix('s')?,
+            };
+            self.names.get(format!("{words} {singular}").trim_start())
+        });
+        let Some(meanings) = meanings else { return false };
+        let all: u32 = meanings.iter().map(|meaning| meaning.count).sum();
+        let this = meanings.iter().find(|meaning| meaning.kind == *kind);
+        this.is_some_and(|meaning| meaning.count * 15 < all)
+    }
+}
+
 /// One thing that a name may mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Meaning {

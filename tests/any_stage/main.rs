@@ -8,6 +8,8 @@
 #[path = "../support/chance.rs"]
 mod chance;
 mod person;
+#[path = "../support/recorded.rs"]
+mod recorded;
 mod scenes;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

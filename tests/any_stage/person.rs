@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use apprentice::events::{Ending, Event, Record, decode, encode};
+use apprentice::events::{Ending, Event, Record};
 use apprentice::ids::{Digest, RequestId, Seq, Timestamp, UserId};
 use apprentice::language::{Outcome, Step};
 use apprentice::learning::{Mind, train};
@@ -15,6 +15,7 @@ use apprentice::world::household::{Household, Kind};
 use apprentice::world::{Domain, StageError};
 
 use crate::chance::below;
+use crate::recorded::recorded;
 use crate::scenes::{pick, said, stage};
 
 /// Where everybody begins.
@@ -137,16 +138,7 @@ impl<'a> Person<'a> {
         let first = self.records.len();
         for event in turn.batch.events {
             self.count(&event, counts);
-            let body = encode(&event);
-            let (kind, head) = (event.kind(), self.session.head());
-            let record = Record {
-                seq: head.next(),
-                at,
-                request,
-                prev: head.digest,
-                digest: Digest::of(&body),
-                event: decode(kind as u16, kind.version(), &body).expect("it was just encoded"),
-            };
+            let record = recorded(self.session.head(), &event, request, at);
             let applied = self.session.apply(&record);
             applied.unwrap_or_else(|error| panic!("{command:?}: {error}"));
             if let Event::EpisodeEnded(ended) = &record.event {

@@ -10,6 +10,8 @@ mod input;
 mod instances;
 mod moods;
 mod precedence;
+#[path = "../support/recorded.rs"]
+mod recorded;
 mod requests;
 mod talk;
 mod transcripts;

@@ -7,13 +7,15 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use apprentice::events::{Event, Record, decode, encode};
-use apprentice::ids::{Digest, RequestId, Timestamp, UserId};
+use apprentice::events::{Event, Record};
+use apprentice::ids::{RequestId, Timestamp, UserId};
 use apprentice::language::{Answer, Outcome, Program, Step, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::session::{Command, Proposed, Rejection, Session, Told, Turn, reply_of};
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Domain, Stage, View};
+
+use crate::recorded::recorded;
 
 /// The recipe that all these tests are about.
 pub const RECIPE: &str = "default-2";
@@ -169,16 +171,7 @@ impl Talk {
         let turn = self.proposes(command, self.requests)?;
         let (request, at) = (turn.batch.request, turn.batch.at);
         for event in turn.batch.events {
-            let body = encode(&event);
-            let (kind, head) = (event.kind(), self.session.head());
-            let record = Record {
-                seq: head.next(),
-                at,
-                request,
-                prev: head.digest,
-                digest: Digest::of(&body),
-                event: decode(kind as u16, kind.version(), &body).expect("it was just encoded"),
-            };
+            let record = recorded(self.session.head(), &event, request, at);
             let applied = self.session.apply(&record);
             applied.unwrap_or_else(|error| panic!("{command:?}: {error}"));
             self.records.push(record);

@@ -145,7 +145,7 @@ impl Domain for Household {
             .iter()
             .enumerate()
             .filter_map(|(rank, name)| {
-                let rare = words::rarely_means(lexicon, &mention.surface, name);
+                let rare = lexicon.rarely_means(&mention.surface, name);
                 distance(name).map(|far| (rare, far, rank))
             })
             .collect();

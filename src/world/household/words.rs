@@ -101,22 +101,6 @@ fn habits() -> Habits {
     Habits { order: order.iter().map(|name| Symbol::new(name)).collect(), clauses, words }
 }
 
-/// Whether fewer than one in fifteen uses of the name mean this kind ("bowl" for a cup).
-pub(super) fn rarely_means(lexicon: &Lexicon, surface: &str, kind: &Symbol) -> bool {
-    let meanings = lexicon.names.get(surface).or_else(|| {
-        let (words, last) = surface.rsplit_once(' ').unwrap_or(("", surface));
-        let singular = match lexicon.plurals.get(last) {
-            Some(singular) => singular.as_str(),
-            None => last.strip_suffix('s')?,
-        };
-        lexicon.names.get(format!("{words} {singular}").trim_start())
-    });
-    let Some(meanings) = meanings else { return false };
-    let all: u32 = meanings.iter().map(|meaning| meaning.count).sum();
-    let this = meanings.iter().find(|meaning| meaning.kind == *kind);
-    this.is_some_and(|meaning| meaning.count * 15 < all)
-}
-
 /// What every user starts with, from `seeds.toml`.
 pub(super) fn seeds() -> SeedSet {
     let seeds: Seeds = embedded("seeds.toml", include_str!("../../../data/household/seeds.toml"));

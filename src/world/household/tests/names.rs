@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::facts::{embedded, facts};
-use super::super::words::rarely_means;
 use super::super::{Kind, Room, Scene, SceneBuilder};
 use super::{Household, mention};
 use crate::language::Utterance;
@@ -121,7 +120,7 @@ fn a_thing_that_can_be_carried_is_hardly_ever_taken_for_another() {
     for (name, meanings) in &lexicon.names {
         for meaning in meanings {
             let kind = Kind::named(meaning.kind.as_str()).unwrap();
-            if kind.pickupable() && rarely_means(lexicon, name, &meaning.kind) {
+            if kind.pickupable() && lexicon.rarely_means(name, &meaning.kind) {
                 rare.push(format!("{name}: {kind}"));
             }
         }
