@@ -1,6 +1,7 @@
 //! How fast an answer comes through the socket, durable. `cargo bench --bench door`
 //!
-//! The real household, the recipe `default`, a data directory on the disk that `target/` is on.
+//! The real household, a data directory on the disk that `target/` is on, and the recipe `default` or
+//! another: `cargo bench --bench door -- default-1`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use apprentice::frontends::Client;
 use apprentice::ids::UserId;
+use apprentice::learning::Recipe;
 use apprentice::service::{Config, Data, Service};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
@@ -22,6 +24,10 @@ fn start(directory: &Path, awake_max: usize) -> Service {
     let mut config = Config::new(Arc::new(Household::new()), data);
     config.listen = vec!["tcp://127.0.0.1:0".to_owned()];
     config.awake_max = awake_max;
+    if let Some(name) = std::env::args().skip(1).find(|argument| !argument.starts_with("--")) {
+        let recipe = Recipe::builtin(&name).unwrap_or_else(|| panic!("no recipe is called {name}"));
+        config.recipe_text = recipe.to_owned();
+    }
     Service::start(config).expect("the service starts")
 }
 

@@ -1,5 +1,5 @@
-use crate::language::{Mention, Symbol};
-use crate::world::{Lexicon, Meaning};
+use crate::language::Mention;
+use crate::world::{Lexicon, Meaning, UsualNames};
 
 /// Letters that a name must have before a slip in it is forgiven: shorter ones are one slip from
 /// too many other words.
@@ -9,32 +9,18 @@ const FORGIVEN_LETTERS_MIN: usize = 5;
 #[derive(Debug)]
 pub struct Names<'a> {
     lexicon: &'a Lexicon,
-    /// Words of the longest name.
-    longest: usize,
-    /// The sort that most names have: what a pronoun is taken for.
-    pronoun_sort: Symbol,
+    usual: &'a UsualNames,
 }
 
 impl<'a> Names<'a> {
     pub fn new(lexicon: &'a Lexicon) -> Names<'a> {
-        let longest = lexicon.names.keys().map(|name| name.split(' ').count()).max().unwrap_or(0);
-        let mut sorts: Vec<(&Symbol, usize)> = Vec::new();
-        for meaning in lexicon.names.values().filter_map(|meanings| meanings.first()) {
-            match sorts.iter_mut().find(|(sort, _)| *sort == &meaning.sort) {
-                Some((_, count)) => *count += 1,
-                None => sorts.push((&meaning.sort, 1)),
-            }
-        }
-        // Ties go to the sort whose first name comes first in the alphabet.
-        let most = sorts.iter().rev().max_by_key(|(_, count)| *count);
-        let pronoun_sort = most.map_or_else(|| Symbol::new("obj"), |(sort, _)| (*sort).clone());
-        Names { lexicon, longest, pronoun_sort }
+        Names { lexicon, usual: lexicon.usual() }
     }
 
     /// The longest name or pronoun that `words` starts with, and how many words it takes.
     pub fn starting(&self, words: &[&str]) -> Option<(usize, Mention)> {
         let first = words.first()?;
-        for count in (1..=self.longest.min(words.len())).rev() {
+        for count in (1..=self.usual.longest.min(words.len())).rev() {
             let window = &words[..count];
             if let Some(mention) = self.named(window) {
                 return Some((count, mention));
@@ -54,7 +40,7 @@ impl<'a> Names<'a> {
         known: &dyn Fn(&str) -> bool,
     ) -> Option<(usize, Mention)> {
         // A slip may also swallow a blank: "coffeemug" is one word of a two-word name.
-        for count in (1..=self.longest.min(words.len())).rev() {
+        for count in (1..=self.usual.longest.min(words.len())).rev() {
             let window = &words[..count];
             if window.iter().all(|word| known(word)) {
                 continue;
@@ -98,7 +84,7 @@ impl<'a> Names<'a> {
     fn pronoun(&self, word: &str) -> Mention {
         Mention {
             surface: word.to_owned(),
-            sort: self.pronoun_sort.clone(),
+            sort: self.usual.sort.clone(),
             types: Vec::new(),
             pronoun: true,
             plural: word == "them" || word == "they",
@@ -134,16 +120,23 @@ pub(super) fn one_slip_apart(a: &str, b: &str) -> bool {
     if a.len().abs_diff(b.len()) > 4 {
         return false;
     }
+    if a.is_ascii() && b.is_ascii() {
+        return one_apart(a.as_bytes(), b.as_bytes());
+    }
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
-    let (short, long) = if a.len() <= b.len() { (&a, &b) } else { (&b, &a) };
+    one_apart(&a, &b)
+}
+
+fn one_apart<L: PartialEq>(a: &[L], b: &[L]) -> bool {
+    let (short, long) = if a.len() <= b.len() { (a, b) } else { (b, a) };
+    if long.len() - short.len() > 1 {
+        return false;
+    }
     let Some(at) = short.iter().zip(long).position(|(x, y)| x != y) else {
         return long.len() == short.len() + 1;
     };
     if short.len() + 1 == long.len() {
         return short[at..] == long[at + 1..];
-    }
-    if short.len() != long.len() {
-        return false;
     }
     let changed = short[at + 1..] == long[at + 1..];
     let swapped = at + 1 < short.len()

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::language::{Exemplar, Habits, LiftedUtterance, Roles, Symbol};
 
@@ -22,9 +22,37 @@ pub struct Lexicon {
     pub habits: Option<Arc<Habits>>,
     /// Which operators go, take, put and open.
     pub roles: Roles,
+    /// Found in `names` when it is first asked for.
+    pub usual: OnceLock<UsualNames>,
+}
+
+/// What a lexicon's names are like on the whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UsualNames {
+    /// Words of the longest name.
+    pub longest: usize,
+    /// The sort that most names have: what a pronoun is taken for.
+    pub sort: Symbol,
 }
 
 impl Lexicon {
+    pub fn usual(&self) -> &UsualNames {
+        self.usual.get_or_init(|| {
+            let longest = self.names.keys().map(|name| name.split(' ').count()).max().unwrap_or(0);
+            let mut sorts: Vec<(&Symbol, usize)> = Vec::new();
+            for meaning in self.names.values().filter_map(|meanings| meanings.first()) {
+                match sorts.iter_mut().find(|(sort, _)| *sort == &meaning.sort) {
+                    Some((_, count)) => *count += 1,
+                    None => sorts.push((&meaning.sort, 1)),
+                }
+            }
+            // Ties go to the sort whose first name comes first in the alphabet.
+            let most = sorts.iter().rev().max_by_key(|(_, count)| *count);
+            let sort = most.map_or_else(|| Symbol::new("obj"), |(sort, _)| (*sort).clone());
+            UsualNames { longest, sort }
+        })
+    }
+
     /// Whether fewer than one in fifteen uses of the name mean this kind ("bowl" for a cup).
     pub fn rarely_means(&self, surface: &str, kind: &Symbol) -> bool {
         let meanings = self.names.get(surface).or_else(|| {

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use serde::Deserialize;
 
@@ -86,6 +86,7 @@ pub(super) fn lexicon(edition: Edition) -> Lexicon {
             putting: Some(Symbol::new("PUT")),
             doors: vec![Symbol::new("OPEN"), Symbol::new("CLOSE")],
         },
+        usual: OnceLock::new(),
     }
 }
 
