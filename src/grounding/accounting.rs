@@ -63,8 +63,22 @@ impl<'a> Account<'a> {
             taught.words.iter().any(|known| matches!(known, Word::Text(text) if text == word))
         };
         let left = self.unknown_object().into_iter().chain(self.unknown_joined());
-        let left = left.chain(self.numbers());
-        owned(left.filter(|word| !in_lesson(word)))
+        let left = left.chain(self.numbers()).filter(|word| !in_lesson(word));
+        owned(left.chain(self.other_state(taught)))
+    }
+
+    /// "A cold bowl", after a lesson about "a warm mug".
+    fn other_state(&self, taught: &LiftedUtterance) -> Option<&'a str> {
+        let state = |word: &str| self.accounting.states.iter().position(|set| set.contains(word));
+        let in_lesson = taught.words.iter().filter_map(|word| match word {
+            Word::Text(text) => state(text),
+            Word::Slot { .. } => None,
+        });
+        let in_lesson: Vec<usize> = in_lesson.collect();
+        let mut said = self.texts().filter_map(|(_, word)| Some((state(word)?, word))).peekable();
+        let (_, first) = *said.peek()?;
+        let other = !in_lesson.is_empty() && said.all(|(state, _)| !in_lesson.contains(&state));
+        other.then_some(first)
     }
 
     /// The words that a clause without a deed passes over: a way to what nobody knows.

@@ -6,6 +6,8 @@ use crate::language::{
 };
 use crate::world::{Domain, Edition};
 
+use super::settings::Accounting;
+
 /// Which things fill the slots of an open program, by what the world allows: the first mention, in
 /// the order of the words, of a type that the operator can ever act on.
 ///
@@ -26,8 +28,8 @@ pub struct Arguments<'a, D: Domain> {
     pub recent: Vec<Symbol>,
     /// Per mention whether nothing of its likeliest type is in the scene.
     pub absent: Vec<bool>,
-    /// Nouns of parts that many things have.
-    pub parts: Option<&'a BTreeSet<String>>,
+    /// What may be passed over, where words are accounted for.
+    pub accounting: Option<&'a Accounting>,
     /// Whether several things that are named side by side each get the operator, and a pronoun means
     /// what the operator can work on.
     pub accounts: bool,
@@ -141,8 +143,9 @@ impl<D: Domain> Arguments<'_, D> {
         Some(Filling { programs: vec![Program { steps }], penalty: first as f32 })
     }
 
-    /// The things that were named as what to act on, and that the program does not use.
-    pub fn passed_over(&self, program: &Program) -> Vec<String> {
+    /// The things that were named as what to act on, and that the program does not use; of a lesson
+    /// also the place where something is to be put.
+    pub fn passed_over(&self, program: &Program, lesson: bool) -> Vec<String> {
         let uses = |kind: &Symbol| program.steps.iter().any(|step| step.args.contains(kind));
         let mut left = Vec::new();
         // "As well as the drawer" is as much as "and the drawer".
@@ -159,11 +162,61 @@ impl<D: Domain> Arguments<'_, D> {
                 before if before.iter().any(|word| JOINING.contains(word)) => false,
                 before => !self.is_object(place, before),
             };
-            if !used && !aside && !mention.pronoun {
+            let acted_on = !aside && !mention.pronoun;
+            let put_there = || lesson && self.ends_put(program) && self.is_put_there(place);
+            let unused = !used && (acted_on || (place > 0 && put_there()));
+            if unused || (place > 0 && self.is_lit(program, place)) {
                 left.push(mention.surface.clone());
             }
         }
         left
+    }
+
+    /// Whether something is to be put on a mention: "wash the spoon and put it on the TABLE".
+    fn is_put_there(&self, place: usize) -> bool {
+        let lexicon = self.domain.lexicon(self.edition);
+        let mut slots = 0;
+        let before = self.clause.lifted.words.iter().take_while(|word| {
+            slots += usize::from(matches!(word, Word::Slot { .. }));
+            slots <= place
+        });
+        let verbs = before.filter_map(|word| match word {
+            Word::Text(text) if self.lists.verbs.contains(text) => Some(text),
+            _ => None,
+        });
+        let (Some(verb), Some(habits)) = (verbs.last(), &lexicon.habits) else { return false };
+        let counts = habits.counts(&format!("V:{verb}")).unwrap_or_default();
+        let most = (0..counts.len()).max_by_key(|&at| counts[at]);
+        let puts = most.is_some_and(|most| lexicon.roles.puts(&habits.order[most]));
+        puts && self.is_place(place) && !self.is_part(place)
+    }
+
+    /// Whether the last thing that is handled is put down, and not taken up again.
+    fn ends_put(&self, program: &Program) -> bool {
+        let roles = &self.domain.lexicon(self.edition).roles;
+        let mut operators = program.steps.iter().rev().map(|step| &step.operator);
+        let last = operators.find(|operator| roles.takes(operator) || roles.puts(operator));
+        last.is_some_and(|operator| roles.puts(operator))
+    }
+
+    /// Whether a program that only goes somewhere was said to look at something in the light of a
+    /// mention: of something that is switched and holds nothing.
+    fn is_lit(&self, program: &Program, place: usize) -> bool {
+        let roles = &self.domain.lexicon(self.edition).roles;
+        let Some(accounting) = self.accounting else { return false };
+        let adjectives = &self.domain.lexicon(self.edition).adjectives;
+        let grammar = Grammar { lists: self.lists, adjectives };
+        let verb = grammar.main_verb(&self.clause.lifted.words);
+        let looks = verb.is_some_and(|verb| accounting.looking.contains(&verb.word));
+        let kinds = self.types[place].as_slice();
+        let operators = || self.domain.signature().operators.iter().map(|known| &known.name);
+        let fits = |operator: &Symbol, at: usize| !self.fitting(operator, at, kinds).is_empty();
+        let switched = operators().any(|operator| roles.works(operator) && fits(operator, 0));
+        let holds = operators().any(|operator| roles.puts(operator) && fits(operator, 1));
+        let goes = program.steps.iter().all(|step| roles.goes(&step.operator));
+        let before = self.before(place);
+        let lights = before.last().is_some_and(|word| accounting.lighting.contains(*word));
+        looks && goes && switched && !holds && lights
     }
 
     /// Whether a mention is named side by side with the one before it.
@@ -326,7 +379,7 @@ impl<D: Domain> Arguments<'_, D> {
             let name = self.said(place).map_or("", |mention| mention.surface.as_str());
             name.rsplit(' ').next().is_some_and(|last| parts.contains(last))
         };
-        self.absent.get(place) == Some(&true) && self.parts.is_some_and(part)
+        self.absent.get(place) == Some(&true) && self.accounting.is_some_and(|a| part(&a.parts))
     }
 
     /// Whether the robot stands at something that holds things and was acted on last.
@@ -377,6 +430,12 @@ impl<D: Domain> Arguments<'_, D> {
             let fits = |kind: &&Symbol| {
                 uses.iter().all(|(operator, place)| self.domain.fits(operator, *place, kind))
             };
+            // A lesson about a fridge is about a table too: what has no door need not be opened.
+            let fits_but_for_doors = |kind: &&Symbol| {
+                let mut uses = uses.iter().filter(|(operator, _)| !roles.is_door(operator));
+                self.accounts
+                    && uses.all(|(operator, place)| self.domain.fits(operator, *place, kind))
+            };
             let moved =
                 uses.iter().any(|(o, place)| *place == 0 && (roles.takes(o) || roles.puts(o)));
             if let Some(held) = self.held.as_ref().filter(fits).filter(|_| moved) {
@@ -386,7 +445,7 @@ impl<D: Domain> Arguments<'_, D> {
                 meant[number - 1] = Some(held.clone());
                 continue;
             }
-            let free = |constants: bool| {
+            let free = |constants: bool, fits: &dyn Fn(&&Symbol) -> bool| {
                 (0..self.types.len()).filter(|place| !used.contains(place)).find_map(|place| {
                     let other =
                         |kind: &&Symbol| !meant.iter().flatten().any(|taken| taken == *kind);
@@ -401,7 +460,10 @@ impl<D: Domain> Arguments<'_, D> {
                 let mut left = (0..self.types.len()).filter(|place| !used.contains(place));
                 left.find_map(|place| Some((place, self.types[place].first()?.clone())))
             };
-            let (place, kind) = free(constants.is_empty()).or_else(|| free(true)).or_else(unfit)?;
+            let (place, kind) = free(constants.is_empty(), &fits)
+                .or_else(|| free(constants.is_empty(), &fits_but_for_doors))
+                .or_else(|| free(true, &fits))
+                .or_else(unfit)?;
             used.insert(place);
             meant[number - 1] = Some(kind);
         }

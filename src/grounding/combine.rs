@@ -111,6 +111,7 @@ pub fn combine<D: Domain>(
             literal: true,
             left_over: Vec::new(),
         },
+        lessons: Vec::new(),
     };
     let mut done = Vec::new();
     if !clauses.is_empty() {
@@ -123,6 +124,8 @@ pub fn combine<D: Domain>(
 pub(super) struct Partial<S> {
     pub scene: S,
     pub candidate: Candidate,
+    /// What clauses were answered with by a lesson.
+    pub lessons: Vec<Program>,
 }
 
 fn extend<D: Domain>(
@@ -210,7 +213,7 @@ impl<D: Domain> Ground<'_, D> {
                 last: before,
                 recent: self.recent(partial),
                 absent: self.absent(partial, &referents.types),
-                parts: self.context.execution.accounting.as_ref().map(|a| &a.parts),
+                accounting: self.context.execution.accounting.as_ref(),
                 accounts,
                 edition: self.context.edition,
             };
@@ -293,7 +296,7 @@ impl<D: Domain> Ground<'_, D> {
             return self.try_filled(partial, offer, filled, mentioned);
         }
         if let (true, Some(first)) = (arguments.accounts, filling.programs.first()) {
-            let left = arguments.passed_over(first);
+            let left = arguments.passed_over(first, !offer.seed);
             if !left.is_empty() {
                 return self.leave(partial, offer, left);
             }
@@ -437,6 +440,16 @@ impl<D: Domain> Ground<'_, D> {
     ) -> Partial<D::Scene> {
         let so_far = &partial.candidate;
         let mut scene = partial.scene.clone();
+        let mut lessons = partial.lessons.clone();
+        let mut filled = filled;
+        if !offer.seed && self.context.execution.accounting.is_some() {
+            // "Put it in the microwave, heat it": once is what was asked for.
+            if filled.missing.is_none() && lessons.contains(&filled.program) {
+                let reason = "the same lesson would be done twice".to_owned();
+                filled.missing = Some(Missing::Slot { reason });
+            }
+            lessons.push(filled.program.clone());
+        }
         let mut steps = so_far.program.steps.clone();
         let mut verdict = match (so_far.verdict.clone(), filled.missing) {
             (Verdict::Runs { .. }, Some(Missing::Slot { reason })) => Verdict::Unfilled { reason },
@@ -487,7 +500,7 @@ impl<D: Domain> Ground<'_, D> {
             literal: so_far.literal && offer.is_literal(),
             left_over: so_far.left_over.clone(),
         };
-        Partial { scene, candidate }
+        Partial { scene, candidate, lessons }
     }
 }
 

@@ -86,9 +86,11 @@ impl Frames {
                 lists.verbs.contains(verb) && !self.is_excluded(tokens.get(at + count + 1))
             })
         });
-        let usual = gerund
-            .max(opener)
-            .filter(|count| *count >= words_min && !self.is_excluded(tokens.get(at + count)));
+        let usual = gerund.max(opener).filter(|count| {
+            *count >= words_min
+                && !self.is_excluded(tokens.get(at + count))
+                && !is_request(&tokens[at..], *count, lists)
+        });
         let Some(count) = usual.or(going) else { return false };
         if !tokens[at + count..].iter().any(|token| !is_mark(token)) {
             return false;
@@ -168,6 +170,14 @@ impl Frames {
     }
 }
 
+/// "Cool the apple" asks for something, where "cool, open the fridge" and "cool open the fridge" do
+/// not: whether the one word that may open a frame is the verb.
+fn is_request(tokens: &[String], count: usize, lists: Option<&WordLists>) -> bool {
+    let (Some(lists), [word]) = (lists, &tokens[..count]) else { return false };
+    let is_verb = |word: &String| lists.verbs.contains(word) || lists.noun_verbs.contains(word);
+    is_verb(word) && tokens.get(count).is_some_and(|next| !is_mark(next) && !is_verb(next))
+}
+
 /// How many tokens the longest phrase takes that `tokens` begin with.
 fn longest(phrases: &BTreeSet<String>, tokens: &[String]) -> Option<usize> {
     (1..=tokens.len().min(PHRASE_WORDS_MAX)).rev().find(|&n| phrase_in(phrases, &tokens[..n]))
@@ -196,6 +206,7 @@ mod tests {
     fn lists() -> WordLists {
         WordLists {
             verbs: set(&["open", "pick", "get", "go", "close", "turn", "shut"]),
+            noun_verbs: set(&["cool"]),
             cuts: set(&["and", "then"]),
             joints: set(&["and", "then"]),
             ..WordLists::default()
@@ -204,7 +215,7 @@ mod tests {
 
     fn stripped(text: &str) -> String {
         let frames = Frames {
-            openers: set(&["please", "could you", "can you", "ok", "next", "robot"]),
+            openers: set(&["please", "could you", "can you", "ok", "next", "robot", "cool"]),
             gerunds: set(&["would you mind"]),
             closers: set(&["please", "for me", "thank you"]),
             fillers: set(&["please"]),
@@ -227,6 +238,9 @@ mod tests {
             ("go close to the sink", "go close to the sink"),
             ("next to the sink", "next to the sink"),
             ("next open the fridge", "open the fridge"),
+            ("cool, open the fridge", "open the fridge"),
+            ("cool open the fridge", "open the fridge"),
+            ("cool the apple in the fridge", "cool the apple in the fridge"),
             ("please", "please"),
             ("the mug, please", "the mug"),
         ] {

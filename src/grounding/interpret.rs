@@ -356,14 +356,15 @@ impl Heard<'_> {
             let mut unexplained = Vec::new();
             for part in &self.parts {
                 let Some(verb) = grammar.main_verb(&part.lifted().words) else { continue };
-                // "Wait" is nothing to do.
-                if grammar.lists.lasting.contains(&verb.word) {
+                // "Wait" and "let it cool" are nothing to do.
+                let lists = grammar.lists;
+                if lists.lasting.contains(&verb.word) || lists.purposes.contains(&verb.word) {
                     continue;
                 }
                 let own = part.offers(self.seeds);
-                let own = own.first().filter(|own| own.seed);
-                let step = own.and_then(|own| own.program.steps.first());
-                let among = step.is_some_and(|step| {
+                let own = own.iter().filter(|own| own.seed);
+                let mut own = own.filter_map(|own| own.program.steps.first());
+                let among = own.any(|step| {
                     offer.program.steps.iter().any(|other| other.operator == step.operator)
                 });
                 match (in_lesson(&verb.word), among) {

@@ -38,6 +38,9 @@ pub struct Moods {
     pub amounts: BTreeSet<String>,
     /// Phrases with such a word that mean nothing of the kind: "all the way".
     pub idioms: BTreeSet<String>,
+    /// Where an utterance of several clauses ends: what stands last is to be done last, as it would be
+    /// without them. "When you are done", "afterwards".
+    pub afterwards: BTreeSet<String>,
     /// Where an utterance begins: its order is not that of the words. "Before".
     pub order_first: BTreeSet<String>,
     /// The same behind the first word: "after".
@@ -106,9 +109,12 @@ impl Moods {
         };
         let from = |at: usize| {
             let phrase = phrase_from(&self.amounts, &tokens[at..])?;
-            // "For a few seconds" is how long, which a parser judges.
-            let lasts = tokens.get(at + 1).is_some_and(|next| lists.lasting.contains(*next));
-            let idiom = lasts || phrase_from(&self.idioms, &tokens[at..]).is_some();
+            // "For a few seconds" and "wait a bit" are how long, which a parser judges.
+            let long = |word: Option<&&str>| word.is_some_and(|word| lists.lasting.contains(*word));
+            let before = at.checked_sub(1).and_then(|before| tokens.get(before));
+            let idiom = long(tokens.get(at + 1))
+                || long(before)
+                || phrase_from(&self.idioms, &tokens[at..]).is_some();
             (!idiom && !aside(at)).then(|| phrase.clone())
         };
         let mut found: Vec<String> = Vec::new();
@@ -138,6 +144,31 @@ impl Moods {
         }
         framed.frames.push(tokens[mark + 1..].join(" "));
         framed.tokens.truncate(mark);
+    }
+
+    /// Takes away that the last of several clauses is to be done last: "wash the mug and put it back
+    /// when you are done". Said of a single request it is a condition, and stays.
+    pub(super) fn strip_order(&self, framed: &mut Framed, lists: &WordLists) {
+        let marks = framed.tokens.iter().rev().take_while(|token| is_mark(token)).count();
+        let end = framed.tokens.len() - marks;
+        let tokens: Vec<&str> = framed.tokens[..end].iter().map(String::as_str).collect();
+        let last = (1..end).find(|&at| {
+            phrase_from(&self.afterwards, &tokens[at..])
+                .is_some_and(|phrase| phrase.split(' ').count() == end - at)
+        });
+        let Some(at) = last else { return };
+        let is_verb = |word: &&&str| {
+            lists.verbs.contains(&lists.base(word)) || lists.noun_verbs.contains(**word)
+        };
+        // "Pick up the clean mug when you are done" is one clause, for all its verbs.
+        let cuts =
+            |word: &&str| is_mark(word) || lists.cuts.contains(*word) || lists.base(word) != **word;
+        let clauses = &tokens[..at];
+        if clauses.iter().filter(is_verb).count() < 2 || !clauses.iter().any(cuts) {
+            return;
+        }
+        framed.frames.push(tokens[at..].join(" "));
+        framed.tokens.truncate(at);
     }
 
     /// Whether a single word says anything of a mood.

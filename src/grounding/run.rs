@@ -76,6 +76,7 @@ impl<D: Domain> Ground<'_, D> {
                 continue;
             }
             let mut unasked = 0;
+            let mut opened = None;
             let on = chosen.on(step);
             let bound = loop {
                 let refusal = match domain.step_on(scene, task, step, &on) {
@@ -107,6 +108,9 @@ impl<D: Domain> Ground<'_, D> {
                 let bound = domain
                     .step_on(scene, task, &first, &refusal.first_on)
                     .map_err(|e| refused(e.reason, false))?;
+                if by_effect && roles.is_door(&first.operator) {
+                    opened = Some((first.clone(), refusal.first_on.clone()));
+                }
                 done.push(first, bound, refusal.first_on);
                 unasked += 1;
                 // What was too far away to contradict the words is near now.
@@ -117,6 +121,9 @@ impl<D: Domain> Ground<'_, D> {
             if let Some(bound) = bound {
                 done.push(step.clone(), bound, on);
             }
+            if let Some((opened, on)) = opened {
+                self.shut_again(scene, done, &program.steps[index + 1..], &opened, on);
+            }
         }
         // Going there is not what it was for.
         let roles = &domain.lexicon(self.context.edition).roles;
@@ -125,6 +132,35 @@ impl<D: Domain> Ground<'_, D> {
         match held_already.filter(|_| only_went) {
             Some(nothing_left) => Err(nothing_left),
             None => Ok(()),
+        }
+    }
+
+    /// Shuts what a lesson had to have opened unasked, unless a later step does or needs it open.
+    fn shut_again(
+        &self,
+        scene: &mut D::Scene,
+        done: &mut Done,
+        rest: &[Step],
+        opened: &Step,
+        on: Vec<Option<String>>,
+    ) {
+        let (domain, task) = (self.moment.domain, self.moment.task);
+        let doors = &domain.lexicon(self.context.edition).roles.doors;
+        let Some(operator) = doors.iter().find(|door| **door != opened.operator) else { return };
+        let shut = Step { operator: operator.clone(), args: opened.args.clone() };
+        if rest.contains(&shut) || done.steps.len() >= PROGRAM_STEPS_MAX {
+            return;
+        }
+        let mut after = scene.clone();
+        let Ok(bound) = domain.step_on(&mut after, task, &shut, &on) else { return };
+        let needs_it = rest.first().is_some_and(|next| {
+            let on = vec![None; next.args.len()];
+            let refusal = domain.step_on(&mut after.clone(), task, next, &on).err();
+            refusal.and_then(|refusal| refusal.first).as_ref() == Some(opened)
+        });
+        if !needs_it {
+            *scene = after;
+            done.push(shut, bound, on);
         }
     }
 

@@ -99,6 +99,14 @@ pub struct Accounting {
     pub parts: BTreeSet<String>,
     /// Words that ask more of a thing than to be switched: "turn the lamp UP", "RED".
     pub degrees: BTreeSet<String>,
+    /// Verbs of looking, which ask for more than going there where a light is named: "LOOK at the
+    /// book in the light".
+    pub looking: BTreeSet<String>,
+    /// What stands before the light then: "BY the lamp".
+    pub lighting: BTreeSet<String>,
+    /// Words of what is to come of a thing, set by set: a lesson whose words say one ("a warm mug") is
+    /// not for a request that says another ("a cold bowl").
+    pub states: Vec<BTreeSet<String>>,
 }
 
 /// Verbs that take a thing along.

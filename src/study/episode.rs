@@ -223,8 +223,9 @@ fn stage(tests: &Tests<'_>, row: &Row) -> Result<Scene, String> {
 }
 
 /// The taught sentence about other things: those of the room for which the program can be done,
-/// that have a plain name, and that cannot be mistaken for anything else in it. Empty when the
-/// sentence does not name its thing: there is nothing to replace.
+/// that have a plain name which the recipe's edition of names knows too, and that cannot be mistaken
+/// for anything else in it. Empty when the sentence does not name its thing: there is nothing to
+/// replace.
 fn retold(tests: &Tests<'_>, number: usize, lesson: &Row) -> Vec<Row> {
     let handles = |operator: &str| operator == "PICKUP" || operator == "PUT";
     let handled = lesson.program.steps.iter().find(|step| handles(step.operator.as_str()));
@@ -234,7 +235,16 @@ fn retold(tests: &Tests<'_>, number: usize, lesson: &Row) -> Vec<Row> {
     let args: BTreeSet<&Symbol> = lesson.program.steps.iter().flat_map(|step| &step.args).collect();
     let mistakable =
         |kind: &Symbol| args.iter().any(|arg| *arg == kind || tests.stages.share_a_name(arg, kind));
-    let fits = |kind: &&Symbol| names.contains_key(*kind) && !mistakable(kind);
+    let known = &tests.household.lexicon(tests.recipe.settings().words.edition).names;
+    let is_known = |kind: &Symbol, name: &str| {
+        known
+            .get(name)
+            .and_then(|meanings| meanings.first())
+            .is_some_and(|first| first.kind == *kind)
+    };
+    let fits = |kind: &&Symbol| {
+        names.get(*kind).is_some_and(|name| is_known(kind, name)) && !mistakable(kind)
+    };
     let carried = lesson.room.kinds().filter(|kind| kind.pickupable());
     let mut others: Vec<&Symbol> = carried.map(Kind::symbol).filter(fits).collect();
     let mut rng = draw::rng(tests.seed, &["other things", &number.to_string()]);

@@ -169,9 +169,13 @@ impl<'a> Explain<'a> {
         answer: &Answer,
     ) -> Failure {
         let reason = match &answer.outcome {
-            Outcome::NotSure => match answer.evidence.discarded.first() {
-                Some(discarded) => format!("dropped: {}", pattern(&discarded.reason)),
-                None => "nothing near enough".to_owned(),
+            Outcome::NotSure => match (&answer.evidence, answer.evidence.discarded.first()) {
+                (Evidence { mood: Some(_), .. }, _) => "taken for no request".to_owned(),
+                (evidence, _) if evidence.left_over().next().is_some() => {
+                    "words that nothing used".to_owned()
+                }
+                (_, Some(discarded)) => format!("dropped: {}", pattern(&discarded.reason)),
+                (_, None) => "nothing near enough".to_owned(),
             },
             outcome if score::accepted_as(lesson, outcome) => match outcome {
                 Outcome::Impossible { reason, .. } => {
@@ -258,11 +262,12 @@ impl<'a> Explain<'a> {
             Outcome::Impossible { program, reason, .. } => {
                 format!("impossible: {program} ({reason})")
             }
-            Outcome::NotSure => match answer.evidence.discarded.first() {
-                Some(discarded) => {
+            Outcome::NotSure => match (unused(answer), answer.evidence.discarded.first()) {
+                (Some(unused), _) => format!("not sure: {unused}"),
+                (None, Some(discarded)) => {
                     format!("not sure: dropped {} ({})", discarded.program, discarded.reason)
                 }
-                None => "not sure".to_owned(),
+                (None, None) => "not sure".to_owned(),
             },
         };
         let Evidence { lifted, nearest, threshold, .. } = &answer.evidence;
@@ -284,6 +289,16 @@ impl<'a> Explain<'a> {
                 .map_or(String::new(), |near| format!("at {:.3} of {threshold:.3}", near.distance)),
             lifted: lifted.join(" | "),
         }
+    }
+}
+
+/// The words for which an answer is *not sure*, where words are what it is for.
+fn unused(answer: &Answer) -> Option<String> {
+    let Evidence { mood, .. } = &answer.evidence;
+    let words: Vec<String> = answer.evidence.left_over().map(|word| format!("{word:?}")).collect();
+    match mood {
+        Some(mood) => Some(format!("no request, for {mood:?}")),
+        None => (!words.is_empty()).then(|| format!("nothing for {}", words.join(", "))),
     }
 }
 

@@ -8,6 +8,7 @@ mod effects;
 mod frames;
 mod input;
 mod instances;
+mod lessons;
 mod moods;
 mod precedence;
 #[path = "../support/recorded.rs"]
