@@ -1,12 +1,11 @@
 use std::collections::BTreeSet;
 
+use super::settings::Accounting;
 use crate::language::{
     Clause, Grammar, LiftedArg, LiftedProgram, Mention, Program, Roles, Step, Symbol, Word,
     WordLists,
 };
 use crate::world::{Domain, Edition};
-
-use super::settings::Accounting;
 
 /// Which things fill the slots of an open program, by what the world allows: the first mention, in
 /// the order of the words, of a type that the operator can ever act on.
@@ -28,11 +27,9 @@ pub struct Arguments<'a, D: Domain> {
     pub recent: Vec<Symbol>,
     /// Per mention whether nothing of its likeliest type is in the scene.
     pub absent: Vec<bool>,
-    /// What may be passed over, where words are accounted for.
+    /// What may be passed over, where words are accounted for. There, several things that are named
+    /// side by side each get the operator, and a pronoun means what the operator can work on.
     pub accounting: Option<&'a Accounting>,
-    /// Whether several things that are named side by side each get the operator, and a pronoun means
-    /// what the operator can work on.
-    pub accounts: bool,
     /// Of the domain's words.
     pub edition: Edition,
 }
@@ -47,6 +44,10 @@ pub struct Filling {
 }
 
 impl<D: Domain> Arguments<'_, D> {
+    pub fn accounts(&self) -> bool {
+        self.accounting.is_some()
+    }
+
     /// - returns: `None` when the words leave a slot open.
     pub fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
         let roles = &self.domain.lexicon(self.edition).roles;
@@ -64,7 +65,7 @@ impl<D: Domain> Arguments<'_, D> {
     /// A lesson about one thing, for things that are named side by side: "wash the apple and the
     /// plate".
     fn each_in_turn(&self, program: &LiftedProgram) -> Option<Filling> {
-        if !self.accounts || program.slots() != 1 || !self.is_next_to(1) {
+        if !self.accounts() || program.slots() != 1 || !self.is_next_to(1) {
             return None;
         }
         let joined = (1..self.types.len()).take_while(|&place| self.is_next_to(place)).count();
@@ -99,17 +100,17 @@ impl<D: Domain> Arguments<'_, D> {
                     return None;
                 }
                 // "Pick up the … next to the mug": what it is about has no name.
-                if self.accounts && roles.takes(operator) && self.is_landmark(place) {
+                if self.accounts() && roles.takes(operator) && self.is_landmark(place) {
                     return None;
                 }
-                if self.accounts && self.is_next_to(place + 1) {
+                if self.accounts() && self.is_next_to(place + 1) {
                     return self.side_by_side(operator, place);
                 }
                 return Some(filling(operator, fitting, place as f32));
             }
-            if (roles.is_door(operator) || (self.accounts && works)) && self.is_pronoun(place) {
+            if (roles.is_door(operator) || (self.accounts() && works)) && self.is_pronoun(place) {
                 let mut here = self.fitting(operator, 0, self.here.as_slice());
-                if self.accounts {
+                if self.accounts() {
                     here.extend(self.fitting(operator, 0, &self.recent));
                 }
                 return Some(filling(operator, here, place as f32))
@@ -278,7 +279,7 @@ impl<D: Domain> Arguments<'_, D> {
         let alone = self.types.len() == 1;
         let first = order.first().map(|(_, place)| *place);
         let several = |first: &usize| self.is_next_to(first + 1) && !self.is_landmark(*first);
-        if let Some(first) = first.filter(|first| self.accounts && several(first)) {
+        if let Some(first) = first.filter(|first| self.accounts() && several(first)) {
             return self.side_by_side(operator, first);
         }
         order.into_iter().find_map(|(_, place)| {
@@ -301,7 +302,7 @@ impl<D: Domain> Arguments<'_, D> {
         };
         let mut own = (0..named).find(is_own);
         let mut penalty = 0.0;
-        if let (true, None, Some(other)) = (self.accounts, own, self.another_thing(operator)) {
+        if let (true, None, Some(other)) = (self.accounts(), own, self.another_thing(operator)) {
             return Some(other);
         }
         if own.is_none() && !self.names_unknown() {
@@ -359,7 +360,7 @@ impl<D: Domain> Arguments<'_, D> {
             let mut kinds = self.fitting(operator, 1, kinds);
             kinds.retain(|kind| *kind != held);
             // What nothing can be put on is said to be so by the world, and nothing else is taken.
-            if self.accounts && kinds.is_empty() && self.is_place(*place) {
+            if self.accounts() && kinds.is_empty() && self.is_place(*place) {
                 kinds.extend(named);
             }
             if !kinds.is_empty() {
@@ -433,7 +434,7 @@ impl<D: Domain> Arguments<'_, D> {
             // A lesson about a fridge is about a table too: what has no door need not be opened.
             let fits_but_for_doors = |kind: &&Symbol| {
                 let mut uses = uses.iter().filter(|(operator, _)| !roles.is_door(operator));
-                self.accounts
+                self.accounts()
                     && uses.all(|(operator, place)| self.domain.fits(operator, *place, kind))
             };
             let moved =

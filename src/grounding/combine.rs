@@ -214,7 +214,6 @@ impl<D: Domain> Ground<'_, D> {
                 recent: self.recent(partial),
                 absent: self.absent(partial, &referents.types),
                 accounting: self.context.execution.accounting.as_ref(),
-                accounts,
                 edition: self.context.edition,
             };
             let carrying = self.context.execution.carrying.as_ref().filter(|_| offer.seed);
@@ -295,7 +294,7 @@ impl<D: Domain> Ground<'_, D> {
             filled.missing = Some(Missing::Slot { reason: format!("nothing of it is {word}") });
             return self.try_filled(partial, offer, filled, mentioned);
         }
-        if let (true, Some(first)) = (arguments.accounts, filling.programs.first()) {
+        if let (true, Some(first)) = (arguments.accounts(), filling.programs.first()) {
             let left = arguments.passed_over(first, !offer.seed);
             if !left.is_empty() {
                 return self.leave(partial, offer, left);
