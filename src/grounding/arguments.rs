@@ -2,8 +2,8 @@ use std::collections::BTreeSet;
 
 use super::settings::Accounting;
 use crate::language::{
-    Clause, Grammar, LiftedArg, LiftedProgram, Mention, Program, Roles, Step, Symbol, Word,
-    WordLists,
+    Clause, Grammar, LiftedArg, LiftedProgram, LiftedUtterance, Mention, Program, Roles, Step,
+    Symbol, Word, WordLists,
 };
 use crate::world::{Domain, Edition};
 
@@ -145,8 +145,10 @@ impl<D: Domain> Arguments<'_, D> {
     }
 
     /// The things that were named as what to act on, and that the program does not use; of a lesson
-    /// also the place where something is to be put.
-    pub fn passed_over(&self, program: &Program, lesson: bool) -> Vec<String> {
+    /// also the place where something is to be put, and what stands in the place of its fixture.
+    ///
+    /// - `lesson`: its words, if the program is a lesson's.
+    pub fn passed_over(&self, program: &Program, lesson: Option<&LiftedUtterance>) -> Vec<String> {
         let uses = |kind: &Symbol| program.steps.iter().any(|step| step.args.contains(kind));
         let mut left = Vec::new();
         // "As well as the drawer" is as much as "and the drawer".
@@ -164,8 +166,14 @@ impl<D: Domain> Arguments<'_, D> {
                 before => !self.is_object(place, before),
             };
             let acted_on = !aside && !mention.pronoun;
-            let put_there = || lesson && self.ends_put(program) && self.is_put_there(place);
-            let unused = !used && (acted_on || (place > 0 && put_there()));
+            let put_there = |lesson| {
+                let instead = self.is_instead(lesson, place);
+                match place {
+                    0 => instead,
+                    _ => (instead || self.ends_put(program)) && self.is_put_there(place),
+                }
+            };
+            let unused = !used && (acted_on || lesson.is_some_and(put_there));
             if unused || (place > 0 && self.is_lit(program, place)) {
                 left.push(mention.surface.clone());
             }
@@ -190,6 +198,25 @@ impl<D: Domain> Arguments<'_, D> {
         let most = (0..counts.len()).max_by_key(|&at| counts[at]);
         let puts = most.is_some_and(|most| lexicon.roles.puts(&habits.order[most]));
         puts && self.is_place(place) && !self.is_part(place)
+    }
+
+    /// Whether a mention stands in the place of a fixture that the lesson names and the clause does not:
+    /// "look into the DRAWER", after a lesson about looking into the fridge.
+    fn is_instead(&self, lesson: &LiftedUtterance, place: usize) -> bool {
+        let said = &self.clause.lifted.words;
+        let missing = |word: &&Word| {
+            matches!(word, Word::Slot { fixture: Some(_), .. }) && !said.contains(word)
+        };
+        let roles = &self.domain.lexicon(self.edition).roles;
+        let kinds = self.types[place].as_slice();
+        let taken = |operator| !self.fitting(operator, 0, kinds).is_empty();
+        let takeable = roles.taking.as_ref().is_some_and(taken);
+        let pronoun = self.is_pronoun(place);
+        lesson.words.iter().any(|word| missing(&word))
+            && !takeable
+            && !pronoun
+            && !self.is_part(place)
+            && !self.is_landmark(place)
     }
 
     /// Whether the last thing that is handled is put down, and not taken up again.

@@ -295,7 +295,7 @@ impl<D: Domain> Ground<'_, D> {
             return self.try_filled(partial, offer, filled, mentioned);
         }
         if let (true, Some(first)) = (arguments.accounts(), filling.programs.first()) {
-            let left = arguments.passed_over(first, !offer.seed);
+            let left = arguments.passed_over(first, offer.taught.filter(|_| !offer.seed));
             if !left.is_empty() {
                 return self.leave(partial, offer, left);
             }

@@ -237,3 +237,35 @@ fn looking_in_a_light_is_more_than_going_there() {
     }
     beside.finish();
 }
+
+/// A lesson about the fridge is about no other thing that stands in its words' place.
+#[test]
+fn a_lesson_about_a_fixture_is_not_for_another_thing() {
+    let peek = ("peek into the fridge", "GOTO Fridge; OPEN Fridge; CLOSE Fridge");
+    let chill = (
+        "put the tomato into the fridge for a moment",
+        "GOTO Tomato; PICKUP Tomato; GOTO Fridge; OPEN Fridge; PUT Tomato Fridge; CLOSE Fridge; \
+         OPEN Fridge; PICKUP Tomato; CLOSE Fridge",
+    );
+    let talk = Talk::taught(&Setting::kitchen(), &[peek, chill]);
+    let mut report = Report::new("the fridge is not meant");
+    for place in ["drawer", "cabinet", "microwave", "sink", "table", "counter", "toaster"] {
+        for text in [
+            format!("peek into the {place}"),
+            format!("please peek into the {place}"),
+            format!("peek in the {place}"),
+            format!("put the potato into the {place} for a moment"),
+        ] {
+            let answer = talk.asks(&text);
+            let fridge = done(&answer).is_some_and(|program| {
+                program
+                    .steps
+                    .iter()
+                    .any(|step| step.args.iter().any(|arg| arg.as_str() == "Fridge"))
+            });
+            report.check(!fridge, || line(&text, "nothing with the fridge", &answer));
+        }
+    }
+    report.finish();
+    assert!(acted(&talk.asks("please peek into the fridge")), "the same fixture");
+}
