@@ -270,6 +270,22 @@ fn cases_are_listed_without_anybodys_sentence() {
     assert_eq!(refused.status.code(), Some(2));
 }
 
+/// A word that nothing used is somebody's: it stands among the failures, which show sentences anyway,
+/// and not in the table that may be published.
+#[test]
+fn words_that_nothing_used_are_not_among_the_cases() {
+    let mut rows = own_steps();
+    rows.push(step(90, "ann", "pick up the zeppelin", "PickupObject", &["PICKUP Mug"]));
+    let corpus = file(&lines(&rows));
+    let printed = |what: &str| {
+        let arguments = ["--protocol", "primitives", "--seed", "1", what, "9"];
+        String::from_utf8(eval(corpus.path(), &arguments).stdout).unwrap()
+    };
+    let (cases, failures) = (printed("--cases"), printed("--failures"));
+    assert!(cases.contains("Cases: ") && !cases.contains("zeppelin"), "{cases}");
+    assert!(failures.contains("unused   nothing for \"zeppelin\""), "{failures}");
+}
+
 #[test]
 fn an_ablation_shows_what_each_difference_brings() {
     let corpus = file(&lines(&own_steps()));

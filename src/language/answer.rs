@@ -83,6 +83,23 @@ impl Evidence {
         let unused = self.accounting.iter().filter(|word| word.used == Use::Nothing);
         unused.map(|word| word.word.as_str())
     }
+
+    /// Which words make the utterance no request, or were used for nothing: `a question: "did"`.
+    pub fn passed_over(&self) -> Option<String> {
+        if let Some(mood) = &self.mood {
+            let (what, word) = match mood {
+                Mood::Asked { word } => ("a question", word),
+                Mood::Told { word } => ("a statement", word),
+                Mood::Forbidden { word } => ("forbidden", word),
+                Mood::Conditional { word } => ("a condition", word),
+                Mood::Later { word } => ("not now", word),
+                Mood::Reordered { word } => ("another order", word),
+            };
+            return Some(format!("{what}: \"{word}\""));
+        }
+        let words: Vec<String> = self.left_over().map(|word| format!("\"{word}\"")).collect();
+        (!words.is_empty()).then(|| format!("nothing for {}", words.join(", ")))
+    }
 }
 
 /// Why an utterance is no request for something to be done now. Each names the words that say so.

@@ -23,6 +23,8 @@ pub struct Failure {
     pub taught: Option<(String, String)>,
     pub meant: String,
     pub got: String,
+    /// Which of the sentence's words were used for nothing, or make it no request.
+    pub passed_over: Option<String>,
     /// The nearest exemplar.
     pub nearest: String,
     /// Whether that is one of the system's own sentences; otherwise it is somebody's.
@@ -88,6 +90,9 @@ impl fmt::Display for Failure {
         }
         writeln!(f, "    meant    {}", self.meant)?;
         writeln!(f, "    got      {}", self.got)?;
+        if let Some(words) = &self.passed_over {
+            writeln!(f, "    unused   {words}")?;
+        }
         write!(f, "    nearest  {} {}; lifted {:?}", self.nearest, self.distance, self.lifted)
     }
 }
@@ -262,12 +267,11 @@ impl<'a> Explain<'a> {
             Outcome::Impossible { program, reason, .. } => {
                 format!("impossible: {program} ({reason})")
             }
-            Outcome::NotSure => match (unused(answer), answer.evidence.discarded.first()) {
-                (Some(unused), _) => format!("not sure: {unused}"),
-                (None, Some(discarded)) => {
+            Outcome::NotSure => match answer.evidence.discarded.first() {
+                Some(discarded) => {
                     format!("not sure: dropped {} ({})", discarded.program, discarded.reason)
                 }
-                (None, None) => "not sure".to_owned(),
+                None => "not sure".to_owned(),
             },
         };
         let Evidence { lifted, nearest, threshold, .. } = &answer.evidence;
@@ -283,22 +287,13 @@ impl<'a> Explain<'a> {
             taught: self.lesson.map(taught),
             meant: row.program.to_string(),
             got,
+            passed_over: answer.evidence.passed_over(),
             nearest: nearest.map_or("nothing".to_owned(), |near| near.exemplar.to_string()),
             seed: nearest.is_none_or(|near| (near.number as usize) < seeds),
             distance: nearest
                 .map_or(String::new(), |near| format!("at {:.3} of {threshold:.3}", near.distance)),
             lifted: lifted.join(" | "),
         }
-    }
-}
-
-/// The words for which an answer is *not sure*, where words are what it is for.
-fn unused(answer: &Answer) -> Option<String> {
-    let Evidence { mood, .. } = &answer.evidence;
-    let words: Vec<String> = answer.evidence.left_over().map(|word| format!("{word:?}")).collect();
-    match mood {
-        Some(mood) => Some(format!("no request, for {mood:?}")),
-        None => (!words.is_empty()).then(|| format!("nothing for {}", words.join(", "))),
     }
 }
 

@@ -1,6 +1,5 @@
 use serde_json::{Value, json};
 
-use crate::cli::transcript::passed_over;
 use crate::events::{Ending, Event, Overlap, Record, TenantEvent};
 use crate::ids::Timestamp;
 use crate::language::Outcome;
@@ -51,7 +50,7 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
         Event::Interpreted(event) => {
             let outcome = match &event.answer.outcome {
                 Outcome::Understood { program, .. } => format!("= {program}"),
-                Outcome::NotSure => match passed_over(&event.answer.evidence) {
+                Outcome::NotSure => match event.answer.evidence.passed_over() {
                     Some(words) => format!("? not sure ({words})"),
                     None => "? not sure".to_owned(),
                 },

@@ -98,11 +98,6 @@ pub(super) fn show_answer(outcome: &Outcome, evidence: &Evidence, actions_before
     play::show(outcome, evidence, actions_before).1
 }
 
-/// Which words make an utterance no request, or were used for nothing: `a question: "did"`.
-pub(super) fn passed_over(evidence: &Evidence) -> Option<String> {
-    play::passed_over(evidence)
-}
-
 fn write(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| {

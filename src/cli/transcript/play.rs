@@ -5,7 +5,7 @@ use crate::cli::terminal::count;
 use crate::events::Ending;
 use crate::frontends::{Client, ClientError};
 use crate::ids::Seq;
-use crate::language::{Evidence, Mood, Outcome};
+use crate::language::{Evidence, Outcome};
 use crate::limits::SCENE_FILE_BYTES_MAX;
 use crate::session::{RejectionCode, Reply, Told};
 use crate::study::transcript::{Act, Answer, Kind, Line, Setting, Transcript};
@@ -309,7 +309,7 @@ pub(super) fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answ
             (Answer::Impossible(Some((program.clone(), step))), text)
         }
         Outcome::NotSure => {
-            let remark = passed_over(evidence).or_else(|| nearest(evidence));
+            let remark = evidence.passed_over().or_else(|| nearest(evidence));
             let text = match remark {
                 Some(remark) => format!("? not sure ({remark})"),
                 None => "? not sure".to_owned(),
@@ -317,23 +317,6 @@ pub(super) fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answ
             (Answer::NotSure, text)
         }
     }
-}
-
-/// Which words make an utterance no request, or were used for nothing: `a question: "did"`.
-pub(super) fn passed_over(evidence: &Evidence) -> Option<String> {
-    if let Some(mood) = &evidence.mood {
-        let (what, word) = match mood {
-            Mood::Asked { word } => ("a question", word),
-            Mood::Told { word } => ("a statement", word),
-            Mood::Forbidden { word } => ("forbidden", word),
-            Mood::Conditional { word } => ("a condition", word),
-            Mood::Later { word } => ("not now", word),
-            Mood::Reordered { word } => ("another order", word),
-        };
-        return Some(format!("{what}: \"{word}\""));
-    }
-    let words: Vec<String> = evidence.left_over().map(|word| format!("\"{word}\"")).collect();
-    (!words.is_empty()).then(|| format!("nothing for {}", words.join(", ")))
 }
 
 fn nearest(evidence: &Evidence) -> Option<String> {
@@ -351,7 +334,7 @@ fn nearest(evidence: &Evidence) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::{Accounted, LiftedUtterance, Near, Use};
+    use crate::language::{Accounted, LiftedUtterance, Mood, Near, Use};
 
     #[test]
     fn not_sure_says_why_in_a_few_words_that_a_transcript_reads_over() {
