@@ -84,7 +84,9 @@ impl<'a> Abstractor<'a> {
         let mut framed = framed;
         if let (Some(moods), true) = (&settings.moods, settings.frames.is_some()) {
             moods.strip_reason(&mut framed);
-            lists.iter().for_each(|lists| moods.strip_order(&mut framed, lists));
+            if let Some(lists) = lists {
+                moods.strip_order(&mut framed, lists);
+            }
         }
         let judged = settings.moods.as_ref().zip(lists);
         let mood = judged.and_then(|(moods, lists)| moods.of(utterance.as_str(), &framed, lists));

@@ -434,13 +434,12 @@ impl<D: Domain> Ground<'_, D> {
         &self,
         partial: &Partial<D::Scene>,
         offer: &Offer<'_>,
-        filled: Filled,
+        mut filled: Filled,
         mentioned: Option<Symbol>,
     ) -> Partial<D::Scene> {
         let so_far = &partial.candidate;
         let mut scene = partial.scene.clone();
         let mut lessons = partial.lessons.clone();
-        let mut filled = filled;
         if !offer.seed && self.context.execution.accounting.is_some() {
             // "Put it in the microwave, heat it": once is what was asked for.
             if filled.missing.is_none() && lessons.contains(&filled.program) {

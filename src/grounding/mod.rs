@@ -17,6 +17,7 @@ mod interpret;
 mod moment;
 mod mood;
 mod names;
+mod passed_over;
 mod pointing;
 mod purpose;
 mod rerank_training;

@@ -1,5 +1,5 @@
 use crate::language::Mention;
-use crate::world::{Lexicon, Meaning, UsualNames};
+use crate::world::{Lexicon, Meaning, NameSummary};
 
 /// Letters that a name must have before a slip in it is forgiven: shorter ones are one slip from
 /// too many other words.
@@ -9,18 +9,18 @@ const FORGIVEN_LETTERS_MIN: usize = 5;
 #[derive(Debug)]
 pub struct Names<'a> {
     lexicon: &'a Lexicon,
-    usual: &'a UsualNames,
+    summary: &'a NameSummary,
 }
 
 impl<'a> Names<'a> {
     pub fn new(lexicon: &'a Lexicon) -> Names<'a> {
-        Names { lexicon, usual: lexicon.usual() }
+        Names { lexicon, summary: lexicon.summary() }
     }
 
     /// The longest name or pronoun that `words` starts with, and how many words it takes.
     pub fn starting(&self, words: &[&str]) -> Option<(usize, Mention)> {
         let first = words.first()?;
-        for count in (1..=self.usual.longest.min(words.len())).rev() {
+        for count in (1..=self.summary.longest.min(words.len())).rev() {
             let window = &words[..count];
             if let Some(mention) = self.named(window) {
                 return Some((count, mention));
@@ -40,7 +40,7 @@ impl<'a> Names<'a> {
         known: &dyn Fn(&str) -> bool,
     ) -> Option<(usize, Mention)> {
         // A slip may also swallow a blank: "coffeemug" is one word of a two-word name.
-        for count in (1..=self.usual.longest.min(words.len())).rev() {
+        for count in (1..=self.summary.longest.min(words.len())).rev() {
             let window = &words[..count];
             if window.iter().all(|word| known(word)) {
                 continue;
@@ -84,7 +84,7 @@ impl<'a> Names<'a> {
     fn pronoun(&self, word: &str) -> Mention {
         Mention {
             surface: word.to_owned(),
-            sort: self.usual.sort.clone(),
+            sort: self.summary.sort.clone(),
             types: Vec::new(),
             pronoun: true,
             plural: word == "them" || word == "they",

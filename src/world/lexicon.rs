@@ -23,12 +23,12 @@ pub struct Lexicon {
     /// Which operators go, take, put and open.
     pub roles: Roles,
     /// Found in `names` when it is first asked for.
-    pub usual: OnceLock<UsualNames>,
+    pub summary: OnceLock<NameSummary>,
 }
 
 /// What a lexicon's names are like on the whole.
 #[derive(Debug, Clone, PartialEq)]
-pub struct UsualNames {
+pub struct NameSummary {
     /// Words of the longest name.
     pub longest: usize,
     /// The sort that most names have: what a pronoun is taken for.
@@ -36,8 +36,8 @@ pub struct UsualNames {
 }
 
 impl Lexicon {
-    pub fn usual(&self) -> &UsualNames {
-        self.usual.get_or_init(|| {
+    pub fn summary(&self) -> &NameSummary {
+        self.summary.get_or_init(|| {
             let longest = self.names.keys().map(|name| name.split(' ').count()).max().unwrap_or(0);
             let mut sorts: Vec<(&Symbol, usize)> = Vec::new();
             for meaning in self.names.values().filter_map(|meanings| meanings.first()) {
@@ -49,7 +49,7 @@ impl Lexicon {
             // Ties go to the sort whose first name comes first in the alphabet.
             let most = sorts.iter().rev().max_by_key(|(_, count)| *count);
             let sort = most.map_or_else(|| Symbol::new("obj"), |(sort, _)| (*sort).clone());
-            UsualNames { longest, sort }
+            NameSummary { longest, sort }
         })
     }
 

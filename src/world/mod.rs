@@ -9,5 +9,5 @@ mod pointing;
 
 pub use domain::{Domain, Infeasible, Stage, StageError, Thing, View};
 pub use edition::Edition;
-pub use lexicon::{Lexicon, Meaning, SeedSet, UsualNames};
+pub use lexicon::{Lexicon, Meaning, NameSummary, SeedSet};
 pub use pointing::Pointing;

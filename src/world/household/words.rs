@@ -86,7 +86,7 @@ pub(super) fn lexicon(edition: Edition) -> Lexicon {
             putting: Some(Symbol::new("PUT")),
             doors: vec![Symbol::new("OPEN"), Symbol::new("CLOSE")],
         },
-        usual: OnceLock::new(),
+        summary: OnceLock::new(),
     }
 }
 
