@@ -12,7 +12,7 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, Response};
+use apprentice::actors::{Ask, PersonAsk, Response};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, Context, CurveKey, Identity, fresh_id};
 use apprentice::ids::{PublicKey, TenantId, UserId};
@@ -105,7 +105,7 @@ impl Flood {
                     turn => Command::Say { utterance: saying(turn) },
                 };
                 index += 1;
-                let ask = Ask::Command(command);
+                let ask = Ask::Person(PersonAsk::Command(command));
                 let bytes = encode_request(&Request { id: fresh_id(), user: user(person), ask });
                 if socket.send(bytes, zmq::DONTWAIT).is_ok() {
                     self.sent.fetch_add(1, Ordering::Relaxed);

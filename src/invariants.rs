@@ -22,6 +22,8 @@ pub enum Invariant {
     ModelAgrees,
     /// A repeated request id returns the first reply and appends nothing.
     ExactlyOnce,
+    /// Every request that was taken is answered once, unless its process dies.
+    AnsweredOnce,
     /// No key, address or reply crosses tenants.
     TenantWall,
     /// A scheduled retrain is finished or failed, never forgotten.

@@ -1,6 +1,8 @@
 //! The actors without sockets: what happens when the log refuses, when somebody else writes, when
 //! the process is about to die, and when a training does not end well.
 
+#[path = "support/front.rs"]
+mod front;
 #[path = "support/toy.rs"]
 #[allow(dead_code)]
 mod toy;
@@ -9,8 +11,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use apprentice::actors::{
-    AnswerTo, Ask, ErrorCode, Failure, Front, House, HouseSettings, NotTaken, Response, Submit,
-    wall_clock,
+    AnswerTo, Ask, ErrorCode, Failure, Front, House, HouseSettings, PersonAsk, Response, wall_clock,
 };
 use apprentice::events::{Batch, Event, SessionClosed};
 use apprentice::frontends::fresh_id;
@@ -20,6 +21,7 @@ use apprentice::service::{Data, Service};
 use apprentice::session::{Command, OnClash, Phase, Query, RejectionCode, Told};
 use apprentice::store::{self, Fault, FaultPlan, FaultyLog, Store};
 use apprentice::world::Stage;
+use front::hand_in;
 use toy::Bells;
 
 fn settings(store: Store, failure: &Failure) -> HouseSettings<Bells> {
@@ -59,13 +61,7 @@ fn ask(front: &Front, request: RequestId, ask: Ask) -> Response {
 fn ask_as(front: &Front, who: (TenantId, UserId), request: RequestId, ask: Ask) -> Response {
     let (sender, receiver) = mpsc::channel();
     let answer = AnswerTo::new(move |response| sender.send(response).unwrap());
-    let submit = Submit { tenant: who.0, user: who.1, request, ask, answer };
-    match front.submit(submit) {
-        Ok(()) => {}
-        Err(NotTaken::Full(_) | NotTaken::Over(..) | NotTaken::Closed(_)) => {
-            panic!("the directory takes it")
-        }
-    }
+    hand_in(front, who, request, ask, answer);
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }
 
@@ -77,7 +73,8 @@ fn insist(front: &Front, command: Command) -> Response {
 fn insist_as(front: &Front, who: (TenantId, UserId), command: Command) -> Response {
     let request = fresh_id();
     loop {
-        match ask_as(front, who.clone(), request, Ask::Command(command.clone())) {
+        match ask_as(front, who.clone(), request, Ask::Person(PersonAsk::Command(command.clone())))
+        {
             Response::Busy(busy) => {
                 std::thread::sleep(Duration::from_millis(u64::from(busy.retry_after_ms)));
             }
@@ -102,9 +99,9 @@ fn a_log_that_is_busy_says_so_and_the_same_request_gets_through() {
     let front = house.front();
     assert!(matches!(insist(&front, start()), Response::Reply(_)));
     let request = fresh_id();
-    let first = ask(&front, request, Ask::Command(say("ring the brass bell")));
+    let first = ask(&front, request, Ask::Person(PersonAsk::Command(say("ring the brass bell"))));
     assert!(matches!(first, Response::Busy(_)), "{first:?}");
-    let second = ask(&front, request, Ask::Command(say("ring the brass bell")));
+    let second = ask(&front, request, Ask::Person(PersonAsk::Command(say("ring the brass bell"))));
     let Response::Reply(reply) = second else { panic!("{second:?}") };
     assert_eq!(reply.first.get(), 3);
     assert_eq!(failure.reason(), None);
@@ -131,7 +128,8 @@ fn somebody_elses_append_is_noticed_and_a_new_actor_reads_it() {
     let batch = Batch { request: fresh_id(), at, events: vec![closed] };
     store.log.append(&stream, after, batch).wait().unwrap();
 
-    let first = ask(&front, fresh_id(), Ask::Command(say("ring the brass bell")));
+    let first =
+        ask(&front, fresh_id(), Ask::Person(PersonAsk::Command(say("ring the brass bell"))));
     assert!(matches!(first, Response::Busy(_)), "{first:?}");
     let answer = insist(&front, say("ring the brass bell"));
     assert!(
@@ -149,7 +147,8 @@ fn a_log_that_dies_stops_the_service_and_nobody_gets_a_reply() {
         let house = house(faulty(&[Fault::None, Fault::None, fault]), &failure);
         let front = house.front();
         assert!(matches!(insist(&front, start()), Response::Reply(_)));
-        let answer = ask(&front, fresh_id(), Ask::Command(say("ring the brass bell")));
+        let answer =
+            ask(&front, fresh_id(), Ask::Person(PersonAsk::Command(say("ring the brass bell"))));
         assert!(
             matches!(&answer, Response::Error(e) if e.code == ErrorCode::Unavailable),
             "{fault:?}: {answer:?}"
@@ -185,7 +184,11 @@ fn a_training_that_panics_leaves_the_mind_as_it_was() {
 #[test]
 fn whoever_sleeps_goes_on_where_they_were() {
     let (store, failure) = (store::open_memory(), Failure::default());
-    let status = |house: &House| match ask(&house.front(), fresh_id(), Ask::Query(Query::Status)) {
+    let status = |house: &House| match ask(
+        &house.front(),
+        fresh_id(),
+        Ask::Person(PersonAsk::Query(Query::Status)),
+    ) {
         Response::Status(status) => status,
         other => panic!("{other:?}"),
     };
@@ -241,7 +244,12 @@ fn one_labs_flood_of_trainings_delays_anothers_by_the_one_that_runs() {
     let mut ends: Vec<(Timestamp, TenantId)> = people
         .iter()
         .map(|who| {
-            let waited = ask_as(&front, who.clone(), fresh_id(), Ask::Wait { seconds: 30 });
+            let waited = ask_as(
+                &front,
+                who.clone(),
+                fresh_id(),
+                Ask::Person(PersonAsk::Wait { seconds: 30 }),
+            );
             let Response::Waited(waited) = waited else { panic!("{waited:?}") };
             assert_eq!(waited.status.phase, Phase::Idle);
             let stream = store.keys.stream_id(&who.0, &who.1).unwrap();

@@ -11,7 +11,7 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, ErrorCode, Response, TenantAsk, TenantVerb};
+use apprentice::actors::{Ask, DoorAsk, ErrorCode, Response, TenantAsk, TenantVerb};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
 use apprentice::ids::{PublicKey, TenantId, UserId};
@@ -260,7 +260,7 @@ fn an_address_that_another_could_take_is_not_answered_to() {
     let socket = stranger(&service, &key, &folder);
     socket.set_identity(b"lab-a's robot").unwrap();
     socket.connect(&service.curve_endpoints()[0]).unwrap();
-    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Hello };
+    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Door(DoorAsk::Hello) };
     socket.send(encode_request(&request), 0).unwrap();
     assert_eq!(socket.poll(zmq::POLLIN, 30_000).unwrap(), 1, "an answer within 30 s");
     let (id, response) = decode_response(&socket.recv_bytes(0).unwrap()).unwrap();
@@ -277,7 +277,7 @@ fn a_thousand_denied_handshakes_leave_the_service_serving() {
     let ada = connect(&service, &key, "ada");
     ada.start(task()).unwrap();
     let unknown = CurveKey::new().unwrap();
-    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Hello };
+    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Door(DoorAsk::Hello) };
     let bytes = encode_request(&request);
     let mut knocked = 0;
     while service.counts().handshakes_denied < KNOCKS {

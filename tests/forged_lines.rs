@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::Arc;
 
-use apprentice::actors::{Ask, ErrorCode, Response};
+use apprentice::actors::{Ask, ErrorCode, PersonAsk, Response};
 use apprentice::events::{Batch, Event, Head, KeyAdmitted, TenantDisabled, TenantOpened};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, ClientError, fresh_id};
@@ -173,7 +173,7 @@ fn a_refusal_of_what_cannot_be_read_quotes_nothing_raw() {
     let socket = zmq::Context::new().socket(zmq::DEALER).unwrap();
     socket.set_linger(0).unwrap();
     socket.connect(service.endpoint().unwrap()).unwrap();
-    let ask = Ask::Command(Command::Close { reason: "x".to_owned() });
+    let ask = Ask::Person(PersonAsk::Command(Command::Close { reason: "x".to_owned() }));
     let request = encode_request(&Request { id: fresh_id(), user: user("mallory"), ask });
     // The same message with a hostile character in a verb and in a field's name.
     let forged = |from: &[u8], to: &[u8]| {

@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, ErrorCode, Response};
+use apprentice::actors::{Ask, DoorAsk, ErrorCode, PersonAsk, Response};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, ClientError, fresh_id};
 use apprentice::ids::{RequestId, UserId};
@@ -80,7 +80,7 @@ impl Stranger {
     /// question is asked until a new connection carries it.
     fn is_heard_again(&self) {
         let answered = (0..60).any(|_| {
-            self.ask(fresh_id(), Ask::Hello);
+            self.ask(fresh_id(), Ask::Door(DoorAsk::Hello));
             self.socket.poll(zmq::POLLIN, 500).unwrap() == 1
         });
         assert!(answered, "an answer within 30 s");
@@ -89,7 +89,7 @@ impl Stranger {
     /// The next answer is to this question: whatever was sent before got none.
     fn nothing_before(&self) {
         let id = fresh_id();
-        self.ask(id, Ask::Hello);
+        self.ask(id, Ask::Door(DoorAsk::Hello));
         let (found, response) = self.answer();
         assert_eq!(found, id);
         assert!(matches!(response, Response::Hello(_)));
@@ -142,7 +142,11 @@ fn an_episode_is_played_taught_and_used_again() {
 fn malformed_messages_are_dropped_and_counted_and_the_next_one_is_answered() {
     let service = bells(Data::Memory);
     let stranger = Stranger::new(&service, zmq::DEALER);
-    let fine = encode_request(&Request { id: fresh_id(), user: user("m"), ask: Ask::Hello });
+    let fine = encode_request(&Request {
+        id: fresh_id(),
+        user: user("m"),
+        ask: Ask::Door(DoorAsk::Hello),
+    });
     let many: Vec<&[u8]> = vec![&fine; 1_000];
     for frames in [&[&b""[..]][..], &[&b"\xff\xfe\x00"[..]], &[&fine, &fine], &many] {
         stranger.send(frames);
@@ -158,7 +162,7 @@ fn faults_are_answered_when_the_id_can_be_read() {
     let service = bells(Data::Memory);
     let stranger = Stranger::new(&service, zmq::DEALER);
     let id = fresh_id();
-    let ask = Ask::Command(Command::Done);
+    let ask = Ask::Person(PersonAsk::Command(Command::Done));
     let good = encode_request(&Request { id, user: user("m"), ask });
     let replace = |from: &[u8], to: &[u8]| {
         let place = good.windows(from.len()).position(|window| window == from).unwrap();
@@ -182,7 +186,7 @@ fn faults_are_answered_when_the_id_can_be_read() {
         recipe: apprentice::ids::Digest::ZERO,
         outcome: Err("because I say so".to_owned()),
     };
-    stranger.ask(id, Ask::Command(internal));
+    stranger.ask(id, Ask::Person(PersonAsk::Command(internal)));
     let (_, response) = stranger.answer();
     assert!(matches!(&response, Response::Error(f) if f.code == ErrorCode::InternalVerb));
     assert_eq!(service.counts().refused, 5);
@@ -195,7 +199,8 @@ fn oversized_frames_get_a_sentence_and_huge_ones_are_cut_off() {
     let stranger = Stranger::new(&service, zmq::DEALER);
     let id = fresh_id();
     let utterance = "x".repeat(FRAME_BYTES_MAX);
-    stranger.ask(id, Ask::Command(Command::Say { utterance: utterance.clone() }));
+    stranger
+        .ask(id, Ask::Person(PersonAsk::Command(Command::Say { utterance: utterance.clone() })));
     let (found, response) = stranger.answer();
     assert_eq!(found, id);
     assert!(matches!(&response, Response::Error(failed) if failed.code == ErrorCode::TooLarge));
@@ -269,7 +274,7 @@ fn requests_sent_at_once_are_carried_out_once_each() {
         for (index, id) in ids.iter().enumerate() {
             let verb = if index % 2 == 0 { "ring" } else { "mute" };
             let utterance = format!("{verb} the silver bell");
-            stranger.ask(*id, Ask::Command(Command::Say { utterance }));
+            stranger.ask(*id, Ask::Person(PersonAsk::Command(Command::Say { utterance })));
         }
     }
     let mut replies = std::collections::BTreeMap::new();
@@ -293,7 +298,10 @@ fn a_full_mailbox_is_an_honest_busy_and_retries_get_through() {
     let mut open: Vec<RequestId> = (0..count).map(|_| fresh_id()).collect();
     while !open.is_empty() {
         for id in &open {
-            stranger.ask(*id, Ask::Command(Command::Say { utterance: utterance.clone() }));
+            stranger.ask(
+                *id,
+                Ask::Person(PersonAsk::Command(Command::Say { utterance: utterance.clone() })),
+            );
         }
         let sent = open.len();
         for _ in 0..sent {

@@ -1,6 +1,8 @@
 //! What one lab may take, and that it takes it from nobody else: quotas and fairness between
 //! tenants, through real actors, sockets and logs.
 
+#[path = "support/front.rs"]
+mod front;
 #[path = "support/toy.rs"]
 #[allow(dead_code)]
 mod toy;
@@ -9,8 +11,8 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use apprentice::actors::{
-    AnswerTo, Ask, Failure, Front, House, HouseSettings, NotTaken, Quota, Refusals, Registrar,
-    Response, Submit, wall_clock,
+    AnswerTo, Ask, DoorAsk, Failure, Front, House, HouseSettings, PersonAsk, Quota, Refusals,
+    Registrar, Response, wall_clock,
 };
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
@@ -21,6 +23,7 @@ use apprentice::session::{Command, OnClash, Phase, Query};
 use apprentice::store::{self, Store};
 use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::Stage;
+use front::hand_in;
 use toy::{Bells, Gate};
 
 const LONG: Duration = Duration::from_secs(30);
@@ -105,19 +108,14 @@ fn send(
 ) {
     let sender = sender.clone();
     let answer = AnswerTo::new(move |response| sender.send(response).unwrap());
-    let submit = Submit { tenant: tenant.clone(), user: user(number), request, ask, answer };
-    match front.submit(submit) {
-        Ok(()) => {}
-        Err(NotTaken::Over(submit, response)) => submit.answer.send(*response),
-        Err(NotTaken::Full(_) | NotTaken::Closed(_)) => panic!("the directory takes it"),
-    }
+    hand_in(front, (tenant.clone(), user(number)), request, ask, answer);
 }
 
 fn stage() -> Stage {
     Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }
 }
 
-const STATUS: Ask = Ask::Query(Query::Status);
+const STATUS: Ask = Ask::Person(PersonAsk::Query(Query::Status));
 
 /// An episode with a lesson, up to the training, which is then due.
 ///
@@ -193,7 +191,13 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
         let told = |command| {
             let id = fresh_id();
             loop {
-                match ask(&front, &full, number, id, Ask::Command(Command::clone(&command))) {
+                match ask(
+                    &front,
+                    &full,
+                    number,
+                    id,
+                    Ask::Person(PersonAsk::Command(Command::clone(&command))),
+                ) {
                     Response::Reply(reply) => return reply.first,
                     Response::Busy(_) => {}
                     other => panic!("{other:?}"),
@@ -214,7 +218,7 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
     }
     assert_eq!(house.usage()[&full].refused.awake_users, 1);
     gate.open();
-    let wait = Ask::Wait { seconds: 30 };
+    let wait = Ask::Person(PersonAsk::Wait { seconds: 30 });
     for number in [4, 5] {
         let waited = ask(&front, &full, number, fresh_id(), wait.clone());
         assert!(matches!(waited, Response::Waited(_)), "{waited:?}");
@@ -233,7 +237,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
     let quotas = Quotas { in_flight: Some(3), ..Quotas::default() };
     allow(&house, &[(&full, quotas), (&other, Quotas::default())]);
     let front = house.front();
-    let told = |command| match ask(&front, &full, 0, fresh_id(), Ask::Command(command)) {
+    let told = |command: Command| match ask(&front, &full, 0, fresh_id(), command.into()) {
         Response::Reply(reply) => reply.first,
         other => panic!("{other:?}"),
     };
@@ -241,9 +245,9 @@ fn requests_in_flight_are_bounded_for_each_lab() {
     // Three who wait for the training hold the three places.
     let (sender, waits) = mpsc::channel();
     for _ in 0..3 {
-        send(&front, &full, 0, fresh_id(), Ask::Wait { seconds: 30 }, &sender);
+        send(&front, &full, 0, fresh_id(), Ask::Person(PersonAsk::Wait { seconds: 30 }), &sender);
     }
-    match ask(&front, &full, 1, fresh_id(), Ask::Hello) {
+    match ask(&front, &full, 1, fresh_id(), Ask::Door(DoorAsk::Hello)) {
         Response::QuotaExceeded(over) => {
             assert_eq!((over.quota, over.used, over.limit), (Quota::InFlight, 3, 3));
         }
@@ -256,7 +260,10 @@ fn requests_in_flight_are_bounded_for_each_lab() {
         let waited = waits.recv_timeout(Duration::from_secs(60)).unwrap();
         assert!(matches!(waited, Response::Waited(_)), "{waited:?}");
     }
-    assert!(matches!(ask(&front, &full, 1, fresh_id(), Ask::Hello), Response::Hello(_)));
+    assert!(matches!(
+        ask(&front, &full, 1, fresh_id(), Ask::Door(DoorAsk::Hello)),
+        Response::Hello(_)
+    ));
 }
 
 /// Plays episodes until the log is full.
@@ -316,9 +323,14 @@ fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
     let lab = lab("lab");
     allow(&house, &[(&lab, Quotas::default())]);
     let (front, before) = (house.front(), holdings(&store, &lab));
-    let wait = Ask::Wait { seconds: 1 };
+    let wait = Ask::Person(PersonAsk::Wait { seconds: 1 });
     for number in 0..50 {
-        for asked in [STATUS, Ask::Query(Query::Known), Ask::Query(Query::Look), wait.clone()] {
+        for asked in [
+            STATUS,
+            Ask::Person(PersonAsk::Query(Query::Known)),
+            Ask::Person(PersonAsk::Query(Query::Look)),
+            wait.clone(),
+        ] {
             match ask(&front, &lab, number, fresh_id(), asked) {
                 Response::Status(status) => {
                     assert_eq!((status.phase, status.seq, status.episodes), (Phase::Idle, 0, 0));
@@ -342,7 +354,7 @@ fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
         ];
         for command in declined {
             let name = command.name();
-            let response = ask(&front, &lab, number, fresh_id(), Ask::Command(command));
+            let response = ask(&front, &lab, number, fresh_id(), command.into());
             assert!(matches!(response, Response::Rejected(_)), "{name}: {response:?}");
         }
     }
@@ -350,16 +362,16 @@ fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
     // Their first command does, and what they were told of themselves was true.
     let told = |asked| ask(&front, &lab, 7, fresh_id(), asked);
     let (Response::Status(seen), Response::Known(known)) =
-        (told(STATUS), told(Ask::Query(Query::Known)))
+        (told(STATUS), told(Ask::Person(PersonAsk::Query(Query::Known))))
     else {
         panic!("a status and exemplars")
     };
-    match told(Ask::Command(Command::StartEpisode { stage: stage() })) {
+    match told(Ask::Person(PersonAsk::Command(Command::StartEpisode { stage: stage() }))) {
         Response::Reply(reply) => assert_eq!(reply.first.get(), 2, "opened before"),
         other => panic!("{other:?}"),
     }
     let (Response::Status(now), Response::Known(known_now)) =
-        (told(STATUS), told(Ask::Query(Query::Known)))
+        (told(STATUS), told(Ask::Person(PersonAsk::Query(Query::Known))))
     else {
         panic!("a status and exemplars")
     };

@@ -10,7 +10,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use apprentice::actors::{
-    AnswerTo, Ask, Book, Failure, House, HouseSettings, OrderError, Response, Submit, fold_tenant,
+    AnswerTo, Ask, Book, Failure, House, HouseSettings, OrderError, Response, fold_tenant,
     wall_clock,
 };
 use apprentice::events::{Batch, Event, EventKind, Head, Record, SessionClosed};
@@ -28,6 +28,7 @@ use apprentice::store::{
 };
 use apprentice::world::Stage;
 use support::diary::Diary;
+use support::front::hand_in;
 use support::toy::Bells;
 
 fn tiny() -> &'static str {
@@ -388,8 +389,7 @@ fn ask(house: &House, ask: Ask) -> Response {
     let (sender, receiver) = mpsc::channel();
     let answer = AnswerTo::new(move |response| sender.send(response).unwrap());
     let (tenant, user) = (local(), UserId::new("ada").unwrap());
-    let submit = Submit { tenant, user, request: fresh_id(), ask, answer };
-    assert!(house.front().submit(submit).is_ok());
+    hand_in(&house.front(), (tenant, user), fresh_id(), ask, answer);
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }
 
@@ -414,7 +414,7 @@ fn a_running_service_closes_segments_and_signs_by_itself() {
         Command::Done,
     ];
     for command in commands {
-        let response = ask(&service, Ask::Command(command.clone()));
+        let response = ask(&service, command.clone().into());
         assert!(matches!(response, Response::Reply(_)), "{command:?}: {response:?}");
     }
     settled(&service);
@@ -437,7 +437,7 @@ fn what_a_crash_kept_from_being_closed_is_closed_at_the_next_waking() {
     let diary = life(&store, "ada");
     let ends = ends(&diary.records());
     let mut service = house(store.clone());
-    let response = ask(&service, Ask::Query(Query::Status));
+    let response = ask(&service, Query::Status.into());
     assert!(!matches!(response, Response::Error(_)), "{response:?}");
     settled(&service);
     service.stop();

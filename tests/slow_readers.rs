@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{ArchiveAsk, Ask, Response};
+use apprentice::actors::{ArchiveAsk, Ask, DoorAsk, PersonAsk, Response};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, CurveKey, Follower, Identity, fresh_id, read_public};
 use apprentice::ids::{PublicKey, Seq, StreamKey, TenantId, UserId};
@@ -219,7 +219,8 @@ fn a_door_without_keys_is_bounded_in_the_same_way() {
     while served.is_flooded_since(start) {
         for socket in &deaf {
             for query in [Query::Known, Query::Look] {
-                let _ = socket.send(request("ada", Ask::Query(query)), zmq::DONTWAIT);
+                let _ = socket
+                    .send(request("ada", Ask::Person(PersonAsk::Query(query))), zmq::DONTWAIT);
             }
         }
         ada.hello().unwrap();
@@ -299,7 +300,7 @@ fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
         socket.set_linger(0).unwrap();
         identity.put_on(&socket).unwrap();
         socket.connect(&service.curve_endpoints()[0]).unwrap();
-        socket.send(request("ada", Ask::Hello), 0).unwrap();
+        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
         socket
     };
     let is_answered = |socket: &zmq::Socket, patience: Duration| {
@@ -323,7 +324,7 @@ fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
     sockets.truncate(KEY_CONNECTIONS_MAX - 1);
     assert!(is_answered(&one_more, BOUND), "there is room again");
     for socket in &sockets {
-        socket.send(request("ada", Ask::Hello), 0).unwrap();
+        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
         assert!(is_answered(socket, BOUND), "nobody else was cut off");
     }
 }

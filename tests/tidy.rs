@@ -332,6 +332,37 @@ fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// What the simulator drives must be all that decides.
+#[test]
+fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
+    let pure = ["actors/seat/", "actors/directory/mod.rs", "actors/directory/erasure.rs"];
+    let banned = [
+        "actix",
+        "tokio",
+        "async",
+        "Instant",
+        "SystemTime",
+        "std::fs",
+        "std::thread",
+        "std::env",
+        "getrandom",
+        "fresh_request",
+        "HashMap",
+        "HashSet",
+        "Mutex",
+        "EventLog",
+    ];
+    let mut seen = 0;
+    for (file, text) in sources() {
+        if pure.iter().any(|path| file.starts_with(path)) {
+            seen += 1;
+            let found = banned.iter().find(|word| text.contains(**word));
+            assert_eq!(found, None, "src/{file}");
+        }
+    }
+    assert!(seen >= 6, "{seen} files");
+}
+
 #[test]
 fn nothing_is_left_undone_in_the_code() {
     let unfinished = ["todo!(", "unimplemented!(", "dbg!("];

@@ -11,9 +11,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use apprentice::actors::{
-    ArchiveAsk, Ask, Busy, ErasedView, ErrorCode, Failed, FeedView, Frame, HeadView, Heads, Hello,
-    KeyView, Ordered, PlainRecords, PlainView, Quota, QuotaExceeded, Rejected, Response,
-    SealedRecords, SealedView, TenantAsk, TenantVerb, TenantView, Waited,
+    ArchiveAsk, Ask, Busy, DoorAsk, ErasedView, ErrorCode, Failed, FeedView, Frame, HeadView,
+    Heads, Hello, KeyView, Ordered, PersonAsk, PlainRecords, PlainView, Quota, QuotaExceeded,
+    Rejected, Response, SealedRecords, SealedView, TenantAsk, TenantVerb, TenantView, Waited,
 };
 use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::frontends::FeedMessage;
@@ -70,12 +70,12 @@ fn requests() -> Vec<(&'static str, Ask)> {
         ("finish_teaching", command(Command::FinishTeaching)),
         ("forget", command(Command::Forget { lesson: seq(9) })),
         ("close", command(Command::Close { reason: "the study is over".into() })),
-        ("status", Ask::Query(Query::Status)),
-        ("look", Ask::Query(Query::Look)),
-        ("known", Ask::Query(Query::Known)),
-        ("wait", Ask::Wait { seconds: 20 }),
-        ("hello", Ask::Hello),
-        ("feed", Ask::Feed),
+        ("status", Ask::Person(PersonAsk::Query(Query::Status))),
+        ("look", Ask::Person(PersonAsk::Query(Query::Look))),
+        ("known", Ask::Person(PersonAsk::Query(Query::Known))),
+        ("wait", Ask::Person(PersonAsk::Wait { seconds: 20 })),
+        ("hello", Ask::Door(DoorAsk::Hello)),
+        ("feed", Ask::Door(DoorAsk::Feed)),
         ("heads", Ask::Archive(ArchiveAsk::Heads { after: Some(STREAM), limit: 1000 })),
         ("records", Ask::Archive(ArchiveAsk::Sealed { stream: STREAM, from: seq(40), limit: 100 })),
         (
@@ -713,7 +713,7 @@ fn a_long_utterance_reaches_the_session_which_says_what_is_wrong() {
     let long = "go ".repeat(UTTERANCE_BYTES_MAX);
     let said = Value::Map(vec![("utterance".to_owned(), Value::Text(long.clone()))]);
     let request = decode_request(&request_with(&[("command", verb("say", said))])).unwrap();
-    assert_eq!(request.ask, Ask::Command(Command::Say { utterance: long }));
+    assert_eq!(request.ask, Ask::Person(PersonAsk::Command(Command::Say { utterance: long })));
 }
 
 #[test]

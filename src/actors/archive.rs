@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
 use super::awake::Awake;
-use super::{Ask, ErrorCode, Response, Submit};
+use super::{AnswerTo, ErrorCode, Response};
 use crate::events::{Header, Record};
 use crate::fairness::{Room, Turns};
 use crate::ids::{Digest, Seq, StreamId, StreamKey, TenantId, Timestamp};
@@ -250,13 +250,20 @@ impl Reader {
 #[derive(Clone)]
 pub(super) struct Archive(Arc<Desk>);
 
+/// A question about the log.
+pub(super) struct Question {
+    pub tenant: TenantId,
+    pub ask: ArchiveAsk,
+    pub answer: AnswerTo,
+}
+
 struct Desk {
     waiting: Mutex<Waiting>,
     changed: Condvar,
 }
 
 struct Waiting {
-    turns: Turns<(Submit, ArchiveAsk)>,
+    turns: Turns<Question>,
     room: Room,
     closed: bool,
 }
@@ -271,23 +278,21 @@ impl Archive {
         thread::Builder::new().name("archive".to_owned()).spawn(move || {
             let _open = open;
             let reader = reader;
-            while let Some((submit, ask)) = serving.next() {
-                let response = reader.answer(&submit.tenant, ask);
-                submit.answer.send(response);
+            while let Some(Question { tenant, ask, answer }) = serving.next() {
+                answer.send(reader.answer(&tenant, ask));
             }
         })?;
         Ok(Archive(desk))
     }
 
-    /// - errors: the request, when its tenant has too many here already, or nobody answers.
-    pub fn ask(&self, submit: Submit) -> Result<(), Box<Submit>> {
-        let Ask::Archive(ask) = submit.ask else { return Err(Box::new(submit)) };
+    /// - errors: the way back, when the tenant has too many here already, or nobody answers.
+    pub fn ask(&self, question: Question) -> Result<(), AnswerTo> {
         let mut waiting = self.0.waiting();
-        if waiting.closed || !waiting.room.take(&submit.tenant, 1) {
-            return Err(Box::new(submit));
+        if waiting.closed || !waiting.room.take(&question.tenant, 1) {
+            return Err(question.answer);
         }
-        let tenant = submit.tenant.clone();
-        waiting.turns.push(&tenant, (submit, ask));
+        let tenant = question.tenant.clone();
+        waiting.turns.push(&tenant, question);
         self.0.changed.notify_one();
         Ok(())
     }
@@ -304,15 +309,15 @@ impl Archive {
 }
 
 impl Desk {
-    fn next(&self) -> Option<(Submit, ArchiveAsk)> {
+    fn next(&self) -> Option<Question> {
         let mut waiting = self.waiting();
         loop {
             if waiting.closed {
                 return None;
             }
-            if let Some(job) = waiting.turns.pop() {
-                waiting.room.give_back(&job.0.tenant, 1);
-                return Some(job);
+            if let Some(question) = waiting.turns.pop() {
+                waiting.room.give_back(&question.tenant, 1);
+                return Some(question);
             }
             waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
         }

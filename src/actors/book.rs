@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use super::life::fresh_request;
+use super::shared::fresh_request;
 use super::{Growths, wall_clock};
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};

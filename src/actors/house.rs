@@ -1,24 +1,29 @@
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use actix::dev::SendError;
-use actix::{Actor, Addr, Arbiter, ArbiterHandle, Recipient, SyncArbiter, System};
+use actix::{Actor, Addr, Arbiter, ArbiterHandle, SyncArbiter, System};
 
-use super::archive::{Archive, Reader};
+use super::archive::{Archive, Question, Reader};
 use super::awake::AwakeCount;
-use super::directory::{Address, Directory, People, SleepAll, Waking};
-use super::farewell::Farewell;
-use super::life::{Life, Parts};
+use super::defect::panic_words;
+use super::directory::actor::{
+    Address, DirectoryActor, ErasePerson, Greeting, People, SleepAll, Waking,
+};
 use super::meters::{Meters, Usage};
+use super::seat::NewSession;
+use super::shared::{Common, Shared};
 use super::trainer::Trainer;
 use super::user::UserActor;
 use super::{
-    AnswerTo, Ask, Book, Erased, Failure, Growths, Hello, OrderError, Registrar, Response, Submit,
+    AnswerTo, ArchiveAsk, Ask, Book, Erased, Failure, Growths, Hello, OrderError, Registrar,
+    Response, Submit,
 };
 use crate::ids::{StreamId, TenantId, UserId};
-use crate::learning::Recipe;
+use crate::learning::{self, Mind, Recipe};
 use crate::replay::{Minds, Work};
 use crate::store::{CacheCounter, CacheCounts, KeyError, Store};
 use crate::tenancy::Clock;
@@ -26,7 +31,7 @@ use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
 pub struct House {
-    directory: Addr<Directory>,
+    directory: Addr<DirectoryActor>,
     registrar: Registrar,
     meters: Arc<Meters>,
     growths: Growths,
@@ -83,20 +88,17 @@ pub enum ActorsError {
 /// Where front ends hand in requests. Knows no domain.
 #[derive(Clone)]
 pub struct Front {
-    directory: Recipient<Submit>,
-    farewell: Recipient<Farewell>,
+    directory: Addr<DirectoryActor>,
     meters: Arc<Meters>,
     archive: Archive,
 }
 
-/// A request that was not taken, given back.
+/// A request that was not taken; its way back.
 pub enum NotTaken {
     /// Too many are waiting.
-    Full(Box<Submit>),
-    /// Its tenant has too much of something, or all together have; this is what to answer.
-    Over(Box<Submit>, Box<Response>),
+    Full(AnswerTo),
     /// Nobody is there any more.
-    Closed(Box<Submit>),
+    Closed(AnswerTo),
 }
 
 impl Front {
@@ -107,12 +109,12 @@ impl Front {
         user: UserId,
         answer: impl FnOnce(Erased) + Send + 'static,
     ) {
-        self.farewell.do_send(Farewell { tenant, user, answer: Box::new(answer) });
+        self.directory.do_send(ErasePerson { tenant, user, answer: Box::new(answer) });
     }
 
-    /// Counts a request that is not for anybody's actor, until it is answered.
+    /// Counts a request until it is answered. Comes before it is handed in.
     ///
-    /// - errors: what to answer, when its tenant has too many in hand, or all together have.
+    /// - errors: what to answer, when its tenant has too much of something, or all together have.
     pub fn let_in(
         &self,
         tenant: &TenantId,
@@ -128,17 +130,30 @@ impl Front {
         self.meters.note_unread(tenant);
     }
 
-    pub fn submit(&self, mut submit: Submit) -> Result<(), NotTaken> {
-        if let Err(response) = self.let_in(&submit.tenant, &submit.ask, &mut submit.answer) {
-            return Err(NotTaken::Over(Box::new(submit), response));
-        }
-        if let Ask::Archive(_) = submit.ask {
-            return self.archive.ask(submit).map_err(NotTaken::Full);
-        }
+    /// Hands in what is asked of a person's actor.
+    pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
         self.directory.try_send(submit).map_err(|error| match error {
-            SendError::Full(submit) => NotTaken::Full(Box::new(submit)),
-            SendError::Closed(submit) => NotTaken::Closed(Box::new(submit)),
+            SendError::Full(submit) => NotTaken::Full(submit.answer),
+            SendError::Closed(submit) => NotTaken::Closed(submit.answer),
         })
+    }
+
+    /// Asks who is there.
+    pub fn greet(&self, answer: AnswerTo) -> Result<(), NotTaken> {
+        self.directory.try_send(Greeting { answer }).map_err(|error| match error {
+            SendError::Full(greeting) => NotTaken::Full(greeting.answer),
+            SendError::Closed(greeting) => NotTaken::Closed(greeting.answer),
+        })
+    }
+
+    /// Asks about a tenant's records.
+    pub fn ask_archive(
+        &self,
+        tenant: TenantId,
+        ask: ArchiveAsk,
+        answer: AnswerTo,
+    ) -> Result<(), NotTaken> {
+        self.archive.ask(Question { tenant, ask, answer }).map_err(NotTaken::Full)
     }
 }
 
@@ -176,19 +191,17 @@ impl House {
         let meters = Arc::new(Meters::new(book.admissions().clone(), store.log.clone()));
         let growths = book.growths().clone();
         let reader = Reader::new(store.log.clone());
-        let parts = Parts {
+        let base = base_mind(&*domain, &recipe)?;
+        let common = Common {
             domain,
             store,
-            recipe,
-            recipe_text,
-            trainers,
+            new: Arc::new(NewSession { recipe, recipe_text, base }),
             minds: minds.clone(),
             meters: meters.clone(),
             growths: growths.clone(),
             failure: failure.clone(),
-            open: lives.enter(),
+            _open: lives.enter(),
         };
-        let parts = parts.with_base_mind().map_err(|reason| ActorsError::BaseMind { reason })?;
         let archive = Archive::start(reader.clone(), lives.enter())
             .map_err(|error| ActorsError::System { reason: error.to_string() })?;
 
@@ -203,17 +216,24 @@ impl House {
                 let system = System::new();
                 let (directory, registrar) = system.block_on(async move {
                     let registrar = Registrar::start(book, book_open, failed);
-                    let life = Life::start(parts, registrar.clone(), |life, trainers| {
-                        SyncArbiter::start(trainers, move || Trainer { life: life.clone() })
-                    });
+                    let trainer = |shared: Arc<Shared<D>>, trainers| {
+                        SyncArbiter::start(trainers, move || Trainer { shared: shared.clone() })
+                    };
+                    let shared = Shared::start(common, registrar.clone(), trainers, trainer);
                     let arbiters: Vec<Arbiter> =
                         (0..arbiters.max(1)).map(|_| Arbiter::new()).collect();
                     let homes = arbiters.iter().map(Arbiter::handle).collect();
-                    let people = Box::new(Homes { life, homes });
+                    let people = Box::new(Homes { shared, homes });
                     let for_directory = registrar.clone();
-                    let directory =
-                        Directory::new(people, awake_max, hello, count, measured, for_directory)
-                            .start();
+                    let directory = DirectoryActor::new(
+                        people,
+                        awake_max,
+                        hello,
+                        count,
+                        measured,
+                        for_directory,
+                    );
+                    let directory = directory.start();
                     (directory, registrar)
                 });
                 let _ = started.send((directory, registrar, System::current()));
@@ -245,10 +265,8 @@ impl House {
     }
 
     pub fn front(&self) -> Front {
-        let directory = self.directory.clone();
         Front {
-            directory: directory.clone().recipient(),
-            farewell: directory.recipient(),
+            directory: self.directory.clone(),
             meters: self.meters.clone(),
             archive: self.archive.clone(),
         }
@@ -284,7 +302,7 @@ impl House {
         answer: impl FnOnce(Erased) + Send + 'static,
     ) {
         let answer = Box::new(answer);
-        self.directory.do_send(Farewell { tenant, user, answer });
+        self.directory.do_send(ErasePerson { tenant, user, answer });
     }
 
     /// People awake now.
@@ -337,23 +355,31 @@ impl Drop for House {
     }
 }
 
+/// Trains the mind that new people start with.
+fn base_mind<D: Domain>(domain: &D, recipe: &Recipe) -> Result<Arc<Mind>, ActorsError> {
+    let train = || learning::train(domain, recipe, &[]).map_err(|error| error.to_string());
+    let trained = catch_unwind(AssertUnwindSafe(train)).map_err(|panic| panic_words(&*panic));
+    let mind = trained.flatten().map_err(|reason| ActorsError::BaseMind { reason })?;
+    Ok(Arc::new(mind))
+}
+
 /// Starts people's actors, spread over arbiters.
 struct Homes<D: Domain> {
-    life: Arc<Life<D>>,
+    shared: Arc<Shared<D>>,
     homes: Vec<ArbiterHandle>,
 }
 
 impl<D: Domain> People for Homes<D> {
     fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
-        self.life.stream_of(tenant, user)
+        self.shared.stream_of(tenant, user)
     }
 
     fn wake(&self, waking: Waking) -> Address {
         // The key is a keyed hash: its bytes are spread evenly.
         let place = usize::from(waking.stream.key.0[0]) % self.homes.len();
-        let life = self.life.clone();
-        let user =
-            UserActor::start_in_arbiter(&self.homes[place], move |_| UserActor::new(life, waking));
+        let shared = self.shared.clone();
+        let start = move |_: &mut _| UserActor::new(shared, waking);
+        let user = UserActor::start_in_arbiter(&self.homes[place], start);
         Address { submit: user.clone().recipient(), sleep: user.recipient() }
     }
 }

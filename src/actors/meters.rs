@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
 
 use super::operator::{TenantAsk, TenantVerb};
-use super::response::{Ask, Quota, QuotaExceeded, Response};
+use super::response::{Ask, PersonAsk, Quota, QuotaExceeded, Response};
 use crate::fairness::{Bucket, Room, TOKEN};
 use crate::ids::TenantId;
 use crate::limits::GATEWAY_IN_FLIGHT_MAX;
@@ -121,7 +121,7 @@ impl Meters {
         meter: &Meter,
     ) -> Result<(), Box<Response>> {
         let appends = match ask {
-            Ask::Command(command) => !matches!(command, Command::Close { .. }),
+            Ask::Person(PersonAsk::Command(command)) => !matches!(command, Command::Close { .. }),
             // The host's orders are how a lab gets out of this.
             Ask::Order(TenantAsk { verb: TenantVerb::Give(order), .. }) => {
                 *tenant != TenantId::local()
@@ -151,10 +151,12 @@ impl Meters {
     ) -> Result<(), Box<Response>> {
         let Some(rate) = quotas.utterances_per_second else { return Ok(()) };
         let cost = match ask {
-            Ask::Command(_) => TOKEN,
-            Ask::Query(_) | Ask::Wait { .. } | Ask::Archive(_) => QUERY_COST,
+            Ask::Person(PersonAsk::Command(_)) => TOKEN,
+            Ask::Person(PersonAsk::Query(_) | PersonAsk::Wait { .. }) | Ask::Archive(_) => {
+                QUERY_COST
+            }
             // Wakes nobody; and an operator must get through when the lab's people do not.
-            Ask::Hello | Ask::Feed | Ask::Order(_) => return Ok(()),
+            Ask::Door(_) | Ask::Order(_) => return Ok(()),
         };
         let burst = quotas.burst.unwrap_or(rate);
         let now_us = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
@@ -173,9 +175,11 @@ impl Meters {
         count(&self.meter(tenant).refused.awake_users, tenant, over)
     }
 
-    /// Notes that a request met a crowd that is not its tenant's alone.
-    pub fn note_busy(&self, tenant: &TenantId) {
+    /// Says no to one person more who would be awake: all tenants together left no room.
+    pub fn refuse_crowd(&self, tenant: &TenantId) -> Response {
         self.meter(tenant).refused.busy.fetch_add(1, Ordering::Relaxed);
+        let crowd = "everybody who is awake is busy and no one else can be woken";
+        Response::busy(crowd, RETRY_CROWD_MS)
     }
 
     /// Notes that something was not sent, because the tenant's connections do not read.
@@ -272,7 +276,7 @@ fn over(quota: Quota, used: u64, limit: u64, retry_after_ms: Option<u32>) -> Quo
 
 #[cfg(test)]
 mod tests {
-    use super::super::wall_clock;
+    use super::super::{DoorAsk, wall_clock};
     use super::*;
     use crate::ids::{PublicKey, StreamId, UserId};
     use crate::session::Query;
@@ -301,7 +305,7 @@ mod tests {
     }
 
     fn say() -> Ask {
-        Ask::Command(Command::Say { utterance: "ring the bell".to_owned() })
+        Command::Say { utterance: "ring the bell".to_owned() }.into()
     }
 
     fn refused(answer: Result<InFlight, Box<Response>>) -> QuotaExceeded {
@@ -317,7 +321,7 @@ mod tests {
         let quotas = Quotas { in_flight: Some(2), ..Quotas::default() };
         let (meters, lab) = meters(&open_memory(), quotas);
         let first = meters.admit(&lab, &say()).unwrap();
-        let second = meters.admit(&lab, &Ask::Hello).unwrap();
+        let second = meters.admit(&lab, &Ask::from(DoorAsk::Hello)).unwrap();
         let over = refused(meters.admit(&lab, &say()));
         assert_eq!((over.quota, over.used, over.limit), (Quota::InFlight, 2, 2));
         assert_eq!(over.retry_after_ms, Some(RETRY_CROWD_MS));
@@ -336,14 +340,14 @@ mod tests {
         let (meters, lab) = meters(&open_memory(), quotas);
         let say_all = |count| (0..count).filter(|_| meters.admit(&lab, &say()).is_ok()).count();
         assert_eq!(say_all(2), 2);
-        let status = Ask::Query(Query::Status);
+        let status = Ask::from(Query::Status);
         let asked = (0..30).filter(|_| meters.admit(&lab, &status).is_ok()).count();
         // One token is left, and with it ten queries; a slow test earns some more.
         assert!((10..30).contains(&asked), "{asked}");
         let over = refused(meters.admit(&lab, &say()));
         assert_eq!((over.quota, over.limit), (Quota::Utterances, 1));
         assert!(over.retry_after_ms.is_some_and(|ms| (1..=1_000).contains(&ms)), "{over:?}");
-        assert!(meters.admit(&lab, &Ask::Hello).is_ok());
+        assert!(meters.admit(&lab, &Ask::from(DoorAsk::Hello)).is_ok());
         assert_eq!(meters.usage()[&lab].in_flight, 0, "who is refused holds no place");
     }
 
@@ -363,9 +367,9 @@ mod tests {
             (Quota::SealedBytes, 1_000, None)
         );
         assert!(over.used > 2_000 && over.message.contains("operator"), "{over:?}");
-        assert!(meters.admit(&lab, &Ask::Query(Query::Known)).is_ok());
+        assert!(meters.admit(&lab, &Ask::Person(PersonAsk::Query(Query::Known))).is_ok());
         let close = Command::Close { reason: "enough".to_owned() };
-        assert!(meters.admit(&lab, &Ask::Command(close)).is_ok());
+        assert!(meters.admit(&lab, &Ask::Person(PersonAsk::Command(close))).is_ok());
         // An operator of the lab, and one of the host.
         let (key, label) = (PublicKey([3; 32]), String::new());
         let admit = Order::Admit { key, role: Role::Gateway, label };
@@ -386,9 +390,10 @@ mod tests {
     #[test]
     fn without_quotas_one_tenant_gets_what_the_service_has_and_another_still_comes_in() {
         let (meters, lab) = meters(&open_memory(), Quotas::default());
-        let held: Vec<_> = std::iter::from_fn(|| meters.admit(&lab, &Ask::Hello).ok()).collect();
+        let held: Vec<_> =
+            std::iter::from_fn(|| meters.admit(&lab, &Ask::from(DoorAsk::Hello)).ok()).collect();
         assert_eq!(held.len(), GATEWAY_IN_FLIGHT_MAX);
-        let busy = meters.admit(&lab, &Ask::Hello).map_err(|response| *response);
+        let busy = meters.admit(&lab, &Ask::from(DoorAsk::Hello)).map_err(|response| *response);
         assert!(matches!(busy, Err(Response::Busy(_))));
         assert!(meters.admit(&TenantId::local(), &say()).is_ok());
         assert_eq!(meters.usage()[&lab].refused.busy, 2);

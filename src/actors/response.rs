@@ -9,23 +9,54 @@ use crate::session::{
 };
 use crate::world::View;
 
-/// What may be asked of the service.
+/// What may be asked of the service, by who answers it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ask {
+    Person(PersonAsk),
+    /// About the records of one's own tenant. Wakes nobody.
+    Archive(ArchiveAsk),
+    /// About the service itself. Wakes nobody.
+    Door(DoorAsk),
+    /// An operator's, about a tenant. Wakes nobody.
+    Order(TenantAsk),
+}
+
+/// What may be asked of a person's actor.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PersonAsk {
     Command(Command),
     Query(Query),
     /// Answered as soon as the phase is not Learning, or after this many seconds.
     Wait {
         seconds: u32,
     },
-    /// Who is there. Wakes nobody.
+}
+
+/// What may be asked about the service itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DoorAsk {
+    /// Who is there.
     Hello,
-    /// About the records of one's own tenant. Wakes nobody.
-    Archive(ArchiveAsk),
-    /// Where the feed of one's own tenant is. The doors answer it.
+    /// Where the feed of one's own tenant is.
     Feed,
-    /// An operator's, about a tenant. The doors hand it to the registrar, and to nobody's actor.
-    Order(TenantAsk),
+}
+
+impl From<Command> for Ask {
+    fn from(command: Command) -> Ask {
+        Ask::Person(PersonAsk::Command(command))
+    }
+}
+
+impl From<Query> for Ask {
+    fn from(query: Query) -> Ask {
+        Ask::Person(PersonAsk::Query(query))
+    }
+}
+
+impl From<DoorAsk> for Ask {
+    fn from(ask: DoorAsk) -> Ask {
+        Ask::Door(ask)
+    }
 }
 
 /// What the service answers.
@@ -55,7 +86,7 @@ pub enum Response {
     Error(Failed),
 }
 
-/// The answer to [`Ask::Wait`].
+/// The answer to [`PersonAsk::Wait`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Waited {
     pub status: Status,

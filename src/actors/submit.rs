@@ -1,11 +1,10 @@
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use actix::Message;
 
 use super::meters::InFlight;
-use super::{Ask, Response};
+use super::presence::Attention;
+use super::{PersonAsk, Response};
 use crate::ids::{RequestId, TenantId, UserId};
 
 /// One request on its way to the actor of its person.
@@ -16,7 +15,7 @@ pub struct Submit {
     pub tenant: TenantId,
     pub user: UserId,
     pub request: RequestId,
-    pub ask: Ask,
+    pub ask: PersonAsk,
     pub answer: AnswerTo,
 }
 
@@ -74,32 +73,6 @@ impl fmt::Debug for AnswerTo {
     }
 }
 
-/// How much one person's actor has to do: requests not yet answered and trainings not yet ended.
-/// Nobody with something to do is put to sleep.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Presence(Arc<AtomicUsize>);
-
-impl Presence {
-    pub fn attend(&self) -> Attention {
-        self.0.fetch_add(1, Ordering::SeqCst);
-        Attention(self.0.clone())
-    }
-
-    pub fn is_idle(&self) -> bool {
-        self.0.load(Ordering::SeqCst) == 0
-    }
-}
-
-/// One thing that a person's actor has to do. Ends when dropped.
-#[derive(Debug)]
-pub(super) struct Attention(Arc<AtomicUsize>);
-
-impl Drop for Attention {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::mpsc;
@@ -121,17 +94,5 @@ mod tests {
             .send(Response::Known(Vec::new()));
         assert_eq!(receiver.recv().unwrap(), Response::Known(Vec::new()));
         assert!(receiver.recv().is_err(), "one answer and no more");
-    }
-
-    #[test]
-    fn a_person_is_idle_when_every_answer_is_out() {
-        let presence = Presence::default();
-        let mut answer = AnswerTo::new(|_| {});
-        answer.hold(presence.attend());
-        let training = presence.attend();
-        answer.send(Response::Known(Vec::new()));
-        assert!(!presence.is_idle());
-        drop(training);
-        assert!(presence.is_idle());
     }
 }

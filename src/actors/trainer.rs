@@ -4,15 +4,16 @@ use std::time::Instant;
 
 use actix::{Actor, Handler, Message, Recipient, SyncContext};
 
-use super::life::{self, Life};
-use super::submit::Attention;
+use super::defect::panic_words;
+use super::presence::Attention;
+use super::shared::{self, Shared};
 use crate::ids::{Digest, StreamId};
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::world::Domain;
 
 /// Trains minds, several at once, on threads of its own beside the actors (`SyncArbiter`).
 pub(super) struct Trainer<D: Domain> {
-    pub life: Arc<Life<D>>,
+    pub shared: Arc<Shared<D>>,
 }
 
 /// A training that is due.
@@ -31,19 +32,19 @@ pub(super) struct Train<D: Domain> {
 #[rtype(result = "()")]
 pub(super) struct Run<D: Domain> {
     pub train: Train<D>,
-    pub seat: Seat<D>,
+    pub slot: Slot<D>,
 }
 
 /// One of the trainers, taken. When it is dropped, however the training ended, the next one in
 /// turn gets it.
-pub(super) struct Seat<D: Domain> {
-    pub life: Arc<Life<D>>,
+pub(super) struct Slot<D: Domain> {
+    pub shared: Arc<Shared<D>>,
     pub stream: StreamId,
 }
 
-impl<D: Domain> Drop for Seat<D> {
+impl<D: Domain> Drop for Slot<D> {
     fn drop(&mut self) {
-        self.life.trained(&self.stream);
+        self.shared.trained(&self.stream);
     }
 }
 
@@ -64,15 +65,14 @@ impl<D: Domain> Handler<Run<D>> for Trainer<D> {
     type Result = ();
 
     fn handle(&mut self, run: Run<D>, _: &mut SyncContext<Self>) {
-        let Run { train: Train { stream, recipe, lessons, tell, attention }, seat } = run;
+        let Run { train: Train { stream, recipe, lessons, tell, attention }, slot } = run;
         let start = Instant::now();
         // A panic that left this handler would end the worker for good, and with it, one by one,
         // every training of everybody.
-        let outcome =
-            catch_unwind(AssertUnwindSafe(|| life::train(&self.life, &stream, &recipe, &lessons)))
-                .unwrap_or_else(|panic| {
-                    Err(format!("training panicked: {}", life::panic_words(&*panic)))
-                });
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            shared::train(&self.shared, &stream, &recipe, &lessons)
+        }))
+        .unwrap_or_else(|panic| Err(format!("training panicked: {}", panic_words(&*panic))));
         tracing::info!(
             %stream,
             lessons = lessons.len(),
@@ -80,7 +80,7 @@ impl<D: Domain> Handler<Run<D>> for Trainer<D> {
             failed = outcome.is_err(),
             "trained"
         );
-        drop(seat);
+        drop(slot);
         // Past the mailbox bound on purpose: this message must not be lost, and there is at most
         // one for each person.
         tell.do_send(Trained { recipe: recipe.digest(), outcome, attention });

@@ -5,8 +5,9 @@ use super::knock::{Knock, knock};
 use super::wire::{self, Request};
 use super::{Context, CurveKey, Endpoint, EndpointError, z85};
 use crate::actors::{
-    ArchiveAsk, Ask, ErasedView, FeedView, HeadView, Heads, Hello, Ordered, PlainRecords, Quota,
-    QuotaExceeded, Response, SealedRecords, TenantAsk, TenantVerb, TenantView, Waited,
+    ArchiveAsk, Ask, DoorAsk, ErasedView, FeedView, HeadView, Heads, Hello, Ordered, PersonAsk,
+    PlainRecords, Quota, QuotaExceeded, Response, SealedRecords, TenantAsk, TenantVerb, TenantView,
+    Waited,
 };
 use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId, UserId};
 use crate::limits::{
@@ -174,7 +175,7 @@ impl Client {
 
     /// Who answers there.
     pub fn hello(&self) -> Result<Hello, ClientError> {
-        match self.ask(Ask::Hello)? {
+        match self.ask(DoorAsk::Hello)? {
             Response::Hello(hello) => Ok(hello),
             other => Err(self.puzzled(&other)),
         }
@@ -215,21 +216,21 @@ impl Client {
     }
 
     pub fn status(&self) -> Result<Status, ClientError> {
-        match self.ask(Ask::Query(Query::Status))? {
+        match self.ask(Query::Status)? {
             Response::Status(status) => Ok(status),
             other => Err(self.puzzled(&other)),
         }
     }
 
     pub fn look(&self) -> Result<View, ClientError> {
-        match self.ask(Ask::Query(Query::Look))? {
+        match self.ask(Query::Look)? {
             Response::Look(view) => Ok(view),
             other => Err(self.puzzled(&other)),
         }
     }
 
     pub fn known(&self) -> Result<Vec<KnownExemplar>, ClientError> {
-        match self.ask(Ask::Query(Query::Known))? {
+        match self.ask(Query::Known)? {
             Response::Known(known) => Ok(known),
             other => Err(self.puzzled(&other)),
         }
@@ -237,7 +238,7 @@ impl Client {
 
     /// Where new records of this client's tenant are published.
     pub fn feed(&self) -> Result<FeedView, ClientError> {
-        match self.ask(Ask::Feed)? {
+        match self.ask(DoorAsk::Feed)? {
             Response::Feed(feed) => Ok(feed),
             other => Err(self.puzzled(&other)),
         }
@@ -318,7 +319,7 @@ impl Client {
         loop {
             let left = end.saturating_duration_since(Instant::now());
             let seconds = (left.as_secs() as u32).clamp(1, WAIT_S_MAX);
-            match self.ask(Ask::Wait { seconds })? {
+            match self.ask(Ask::Person(PersonAsk::Wait { seconds }))? {
                 Response::Waited(waited) if waited.status.phase != Phase::Learning => {
                     return Ok(waited);
                 }
@@ -342,19 +343,19 @@ impl Client {
     /// Sends a command under a request id of the caller's: to ask again after a restart of either
     /// end what came of it. A new command must have a new id.
     pub fn command_again(&self, id: RequestId, command: Command) -> Result<Reply, ClientError> {
-        match self.ask_again(id, Ask::Command(command))? {
+        match self.ask_again(id, command.into())? {
             Response::Reply(reply) => Ok(reply),
             other => Err(self.puzzled(&other)),
         }
     }
 
-    fn ask(&self, ask: Ask) -> Result<Response, ClientError> {
-        self.ask_again(fresh_id(), ask)
+    fn ask(&self, ask: impl Into<Ask>) -> Result<Response, ClientError> {
+        self.ask_again(fresh_id(), ask.into())
     }
 
     fn ask_again(&self, id: RequestId, ask: Ask) -> Result<Response, ClientError> {
         let waits = match &ask {
-            Ask::Wait { seconds } => Duration::from_secs(u64::from(*seconds)),
+            Ask::Person(PersonAsk::Wait { seconds }) => Duration::from_secs(u64::from(*seconds)),
             _ => Duration::ZERO,
         };
         let bytes = wire::encode_request(&Request { id, user: self.user.clone(), ask });

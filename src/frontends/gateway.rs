@@ -16,8 +16,8 @@ use super::wire::{self, Refused};
 use super::zap::{Doorkeeper, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
 use crate::actors::{
-    AnswerTo, Ask, ErasedView, ErrorCode, Failed, Failure, Front, NotTaken, Ordered, Registrar,
-    Response, Submit, TenantAsk, TenantVerb, TenantView,
+    AnswerTo, Ask, DoorAsk, ErasedView, ErrorCode, Failed, Failure, Front, NotTaken, Ordered,
+    Registrar, Response, Submit, TenantAsk, TenantVerb, TenantView,
 };
 use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::{IN_HAND_BYTES_MAX, UNSENT_BYTES_MAX, UNSENT_CONNECTION_BYTES_MAX};
@@ -401,40 +401,44 @@ impl Hall {
         if self.stopping.load(Ordering::SeqCst) {
             return self.busy(peer, id, "the service is stopping");
         }
-        if ask == Ask::Feed {
-            let plain = caller.is_one_of(rights::PLAIN);
-            let view = |views: &Views| Response::Feed(views.view(&caller.tenant(), plain));
-            let none = || Response::error(ErrorCode::Unavailable, "this service has no feed");
-            return self.answer(peer, id, self.feed.as_ref().map_or_else(none, view));
-        }
-        let Some(in_hand) = self.in_hand.place(&caller.tenant(), None, bytes) else {
+        let tenant = caller.tenant();
+        let Some(in_hand) = self.in_hand.place(&tenant, None, bytes) else {
             return self.busy(peer, id, "the requests that the service has in hand are too large");
         };
         let mut answer = self.answer_to(peer, id, in_hand);
-        if let Ask::Order(_) = &ask
-            && let Err(response) = self.front.let_in(&caller.tenant(), &ask, &mut answer)
-        {
+        if let Err(response) = self.front.let_in(&tenant, &ask, &mut answer) {
             return self.over(answer, *response);
         }
-        let ask = match ask {
+        let taken = match ask {
+            Ask::Person(ask) => {
+                self.front.submit(Submit { tenant, user, request: id, ask, answer })
+            }
+            Ask::Archive(ask) => self.front.ask_archive(tenant, ask, answer),
+            Ask::Door(DoorAsk::Hello) => self.front.greet(answer),
+            Ask::Door(DoorAsk::Feed) => return answer.send(self.feed_of(&caller)),
             Ask::Order(order) => return self.order(&caller, order, id, answer),
-            ask => ask,
         };
-        let submit = Submit { tenant: caller.tenant(), user, request: id, ask, answer };
-        match self.front.submit(submit) {
+        match taken {
             Ok(()) => {}
-            Err(NotTaken::Full(submit)) => {
+            Err(NotTaken::Full(answer)) => {
                 count(&self.counters.busy);
                 let full = "the service has too many requests in hand";
-                submit.answer.send(Response::busy(full, RETRY_FULL_MS));
+                answer.send(Response::busy(full, RETRY_FULL_MS));
             }
-            Err(NotTaken::Over(submit, response)) => self.over(submit.answer, *response),
-            Err(NotTaken::Closed(submit)) => {
+            Err(NotTaken::Closed(answer)) => {
                 self.failure.report("the directory of people is gone");
                 let gone = "the service is being restarted";
-                submit.answer.send(Response::error(ErrorCode::Unavailable, gone));
+                answer.send(Response::error(ErrorCode::Unavailable, gone));
             }
         }
+    }
+
+    /// Where the feed of the caller's tenant is.
+    fn feed_of(&self, caller: &Caller) -> Response {
+        let plain = caller.is_one_of(rights::PLAIN);
+        let view = |views: &Views| Response::Feed(views.view(&caller.tenant(), plain));
+        let none = || Response::error(ErrorCode::Unavailable, "this service has no feed");
+        self.feed.as_ref().map_or_else(none, view)
     }
 
     fn over(&self, answer: AnswerTo, response: Response) {

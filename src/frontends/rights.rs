@@ -1,6 +1,8 @@
 //! Who may ask what. The table stands in `schema/wire.md` too.
 
-use crate::actors::{ArchiveAsk, Ask, ErrorCode, Failed, TenantAsk, TenantVerb};
+use crate::actors::{
+    ArchiveAsk, Ask, DoorAsk, ErrorCode, Failed, PersonAsk, TenantAsk, TenantVerb,
+};
 use crate::ids::TenantId;
 use crate::tenancy::{Admitted, Order, Role};
 
@@ -99,11 +101,13 @@ pub(super) const PLAIN: &[Role] = &[Role::Operator];
 /// records only.
 fn roles_for(ask: &Ask) -> &'static [Role] {
     match ask {
-        Ask::Hello => &[Role::Gateway, Role::Operator, Role::Auditor],
+        Ask::Door(DoorAsk::Hello) => &[Role::Gateway, Role::Operator, Role::Auditor],
         Ask::Archive(ArchiveAsk::Plain { .. }) => PLAIN,
-        Ask::Archive(_) | Ask::Feed => SEALED,
-        Ask::Query(_) | Ask::Wait { .. } => &[Role::Gateway, Role::Operator],
-        Ask::Command(_) => &[Role::Gateway],
+        Ask::Archive(_) | Ask::Door(DoorAsk::Feed) => SEALED,
+        Ask::Person(PersonAsk::Query(_) | PersonAsk::Wait { .. }) => {
+            &[Role::Gateway, Role::Operator]
+        }
+        Ask::Person(PersonAsk::Command(_)) => &[Role::Gateway],
         Ask::Order(_) => &[Role::Operator],
     }
 }
@@ -120,11 +124,11 @@ mod tests {
         let tenant = TenantId::new("lab").unwrap();
         let keyed = |role| Caller::Keyed(Admitted { tenant: tenant.clone(), role });
         let asks = [
-            Ask::Hello,
-            Ask::Query(Query::Known),
-            Ask::Wait { seconds: 1 },
-            Ask::Command(Command::Done),
-            Ask::Feed,
+            DoorAsk::Hello.into(),
+            Query::Known.into(),
+            Ask::Person(PersonAsk::Wait { seconds: 1 }),
+            Command::Done.into(),
+            DoorAsk::Feed.into(),
             Ask::Archive(ArchiveAsk::Heads { after: None, limit: 1 }),
             Ask::Archive(ArchiveAsk::Sealed {
                 stream: StreamKey::TENANT,
@@ -145,7 +149,7 @@ mod tests {
         assert_eq!(allowed(keyed(Role::Operator)), operator);
         let auditor = [true, false, false, false, true, true, true, false];
         assert_eq!(allowed(keyed(Role::Auditor)), auditor);
-        let failed = keyed(Role::Auditor).may(&Ask::Query(Query::Look)).unwrap_err();
+        let failed = keyed(Role::Auditor).may(&Query::Look.into()).unwrap_err();
         assert_eq!(failed.code, ErrorCode::Denied);
         assert_eq!(
             failed.message,

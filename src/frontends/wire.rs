@@ -8,8 +8,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::orders::WireOrder;
 use crate::actors::{
-    ArchiveAsk, Ask, Busy, ErasedView, ErrorCode, Failed, FeedView, Heads, Hello, Ordered,
-    PlainRecords, QuotaExceeded, Rejected, Response, SealedRecords, TenantAsk, TenantView, Waited,
+    ArchiveAsk, Ask, Busy, DoorAsk, ErasedView, ErrorCode, Failed, FeedView, Heads, Hello, Ordered,
+    PersonAsk, PlainRecords, QuotaExceeded, Rejected, Response, SealedRecords, TenantAsk,
+    TenantView, Waited,
 };
 use crate::ids::{RequestId, Seq, StreamKey, TenantId, UserId};
 use crate::limits::{FRAME_BYTES_MAX, WIRE_DEPTH_MAX};
@@ -90,12 +91,12 @@ impl WireQuery {
 
     fn ask(self) -> Ask {
         Ask::Archive(match self {
-            WireQuery::Look => return Ask::Query(Query::Look),
-            WireQuery::Known => return Ask::Query(Query::Known),
-            WireQuery::Status => return Ask::Query(Query::Status),
-            WireQuery::Wait { seconds } => return Ask::Wait { seconds },
-            WireQuery::Hello => return Ask::Hello,
-            WireQuery::Feed => return Ask::Feed,
+            WireQuery::Look => return Query::Look.into(),
+            WireQuery::Known => return Query::Known.into(),
+            WireQuery::Status => return Query::Status.into(),
+            WireQuery::Wait { seconds } => return Ask::Person(PersonAsk::Wait { seconds }),
+            WireQuery::Hello => return DoorAsk::Hello.into(),
+            WireQuery::Feed => return DoorAsk::Feed.into(),
             WireQuery::Heads { after, limit } => ArchiveAsk::Heads { after, limit },
             WireQuery::Records { stream, from, limit } => {
                 ArchiveAsk::Sealed { stream, from, limit }
@@ -181,13 +182,15 @@ pub fn encode_request(request: &Request) -> Vec<u8> {
         tenant: None,
     };
     match &request.ask {
-        Ask::Command(command) => map.command = Some(command),
-        Ask::Query(Query::Look) => map.query = Some(WireQuery::Look),
-        Ask::Query(Query::Known) => map.query = Some(WireQuery::Known),
-        Ask::Query(Query::Status) => map.query = Some(WireQuery::Status),
-        Ask::Wait { seconds } => map.query = Some(WireQuery::Wait { seconds: *seconds }),
-        Ask::Hello => map.query = Some(WireQuery::Hello),
-        Ask::Feed => map.query = Some(WireQuery::Feed),
+        Ask::Person(PersonAsk::Command(command)) => map.command = Some(command),
+        Ask::Person(PersonAsk::Query(Query::Look)) => map.query = Some(WireQuery::Look),
+        Ask::Person(PersonAsk::Query(Query::Known)) => map.query = Some(WireQuery::Known),
+        Ask::Person(PersonAsk::Query(Query::Status)) => map.query = Some(WireQuery::Status),
+        Ask::Person(PersonAsk::Wait { seconds }) => {
+            map.query = Some(WireQuery::Wait { seconds: *seconds })
+        }
+        Ask::Door(DoorAsk::Hello) => map.query = Some(WireQuery::Hello),
+        Ask::Door(DoorAsk::Feed) => map.query = Some(WireQuery::Feed),
         Ask::Archive(ask) => map.query = Some(WireQuery::of_archive(ask)),
         Ask::Order(TenantAsk { tenant, verb }) => {
             (map.order, map.tenant) = (WireOrder::of(verb), tenant.as_ref());
@@ -231,7 +234,7 @@ pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
             check_command(&verb).map_err(|(code, message)| refuse(code, message))?;
             let command = unpack::<CommandField>(bytes)
                 .map_err(|reason| malformed(&format!("command {verb:?}"), reason))?;
-            Ask::Command(command.command)
+            command.command.into()
         }
         (None, Some(Verb(verb)), None) => {
             check_query(&verb).map_err(|message| refuse(ErrorCode::UnknownVerb, message))?;

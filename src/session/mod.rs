@@ -23,6 +23,7 @@ pub use state::{LiveLesson, State};
 use self::decide::Refusal;
 use crate::events::{Batch, Durable, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
+use crate::invariants::Invariant;
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::world::Domain;
 
@@ -148,7 +149,8 @@ impl<D: Domain> Session<D> {
     ///
     /// - panics: when `mind` is another one (invariant `ModelAgrees`).
     pub fn install(&mut self, mind: Arc<Mind>) {
-        assert_eq!(Some(mind.digest()), self.state.mind, "ModelAgrees: the state names its mind");
+        let law = Invariant::ModelAgrees;
+        assert_eq!(Some(mind.digest()), self.state.mind, "{law}: the state names its mind");
         self.mind = Some(mind);
     }
 

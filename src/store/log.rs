@@ -96,6 +96,9 @@ impl Future for Pending {
     }
 }
 
+/// Milliseconds after which a request may be sent again that met another writer, or a full log.
+const RETRY_APPEND_MS: u32 = 100;
+
 /// Why a batch was not appended, or cannot be known to be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AppendError {
@@ -119,6 +122,31 @@ pub enum AppendError {
     /// The committer is gone; the batch may or may not be there.
     #[error("the log was closed before it answered")]
     Gone,
+}
+
+impl AppendError {
+    /// Whether nothing was appended, so that whoever decided on the batch may go on. Otherwise only
+    /// reading the log says what is there.
+    pub fn is_certain(&self) -> bool {
+        match self {
+            AppendError::Busy { .. } | AppendError::TooLarge { .. } => true,
+            // Another writer appended: the state that the batch was decided on is old.
+            AppendError::Conflict { .. } => false,
+            AppendError::Erased | AppendError::Key { .. } => false,
+            AppendError::Poisoned { .. } | AppendError::Gone => false,
+        }
+    }
+
+    /// Whether the log takes nothing more until the service is restarted.
+    pub fn is_fatal(&self) -> bool {
+        matches!(self, AppendError::Poisoned { .. } | AppendError::Gone)
+    }
+
+    /// Milliseconds after which the same request may succeed; none when time does not help.
+    pub fn retry_after_ms(&self) -> Option<u32> {
+        let passes = matches!(self, AppendError::Busy { .. } | AppendError::Conflict { .. });
+        passes.then_some(RETRY_APPEND_MS)
+    }
 }
 
 /// Why a stream cannot be read.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, Response};
+use apprentice::actors::{Ask, PersonAsk, Response};
 use apprentice::frontends::fresh_id;
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::ids::{RequestId, Seq, UserId};
@@ -88,7 +88,7 @@ impl Crowd {
             Command::Teach { explains, actions: vec![1], on_clash: OnClash::Ask },
             Command::FinishTeaching,
         ] {
-            self.all_ask(people, &Ask::Command(command));
+            self.all_ask(people, &Ask::Person(PersonAsk::Command(command)));
         }
     }
 }
@@ -117,11 +117,11 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
     let crowd = Crowd::new(&service);
     let people = TRAIN_QUEUE_MAX + 6;
     crowd.all_teach(people);
-    let status = Ask::Query(Query::Status);
+    let status = Ask::Person(PersonAsk::Query(Query::Status));
     assert!(phases(&crowd.all_ask(people, &status)).iter().all(|&p| p == Phase::Learning));
 
     // More waiters than one person may have, and more requests than the gateway has in hand.
-    let wait = Ask::Wait { seconds: WAIT_S_MAX };
+    let wait = Ask::Person(PersonAsk::Wait { seconds: WAIT_S_MAX });
     let waits = people * WAITERS_MAX + 1;
     assert!(waits > GATEWAY_IN_FLIGHT_MAX);
     crowd.send(0, fresh_id(), &wait);
@@ -145,7 +145,7 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
     let until = Instant::now() + Duration::from_secs(60);
     while !learned(crowd.all_ask(people, &status)) {
         assert!(Instant::now() < until, "a training was forgotten");
-        crowd.all_ask(people, &Ask::Wait { seconds: 5 });
+        crowd.all_ask(people, &Ask::Person(PersonAsk::Wait { seconds: 5 }));
     }
     service.stop().unwrap();
 }
@@ -161,7 +161,7 @@ fn a_failed_service_does_not_wait_for_a_training() {
     let crowd = Crowd::new(&service);
     crowd.all_teach(2);
     let stage = Stage::Task { task: "Brass Glass".into(), seed: 1 };
-    let begin = Ask::Command(Command::StartEpisode { stage });
+    let begin = Ask::Person(PersonAsk::Command(Command::StartEpisode { stage }));
     (2..14).for_each(|person| crowd.send(person, fresh_id(), &begin));
     let reason = service.wait().expect("its log is gone");
     let start = Instant::now();

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use apprentice::actors::{Ask, ErrorCode, Response};
+use apprentice::actors::{Ask, ErrorCode, PersonAsk, Response};
 use apprentice::ids::RequestId;
 use apprentice::limits::REQUEST_RING;
 use apprentice::session::{Command, OnClash, Phase, Query, Status};
@@ -115,7 +115,11 @@ impl<'a> Person<'a> {
     /// A training that was under way when the service died comes to its end (`NoLostWork`).
     fn wait_until_learned(&self) -> Option<Status> {
         loop {
-            match self.line.ask(self.fresh(), &Ask::Wait { seconds: 5 })?.response {
+            match self
+                .line
+                .ask(self.fresh(), &Ask::Person(PersonAsk::Wait { seconds: 5 }))?
+                .response
+            {
                 Response::Waited(waited) if waited.status.phase != Phase::Learning => {
                     return Some(waited.status);
                 }
@@ -170,7 +174,7 @@ impl<'a> Person<'a> {
     }
 
     fn command(&self, id: RequestId, command: &Command) -> Option<Outcome> {
-        let ask = Ask::Command(command.clone());
+        let ask = Ask::Person(PersonAsk::Command(command.clone()));
         let mut heard = self.line.ask(id, &ask)?;
         while matches!(&heard.response, Response::Error(e) if e.code == ErrorCode::Internal) {
             self.signals.defects.fetch_add(1, Ordering::SeqCst);
@@ -216,7 +220,7 @@ impl<'a> Person<'a> {
     }
 
     fn oldest_lesson(&self) -> Option<apprentice::ids::Seq> {
-        match self.line.ask(self.fresh(), &Ask::Query(Query::Known))?.response {
+        match self.line.ask(self.fresh(), &Ask::Person(PersonAsk::Query(Query::Known)))?.response {
             Response::Known(known) => known.iter().find_map(|known| known.lesson),
             Response::Error(_) => None,
             other => panic!("{:?}: {other:?}", self.ledger.user),

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, Response};
+use apprentice::actors::{Ask, DoorAsk, PersonAsk, Response};
 use apprentice::frontends::wire::{Request, decode_response, encode_request};
 use apprentice::frontends::{Client, fresh_id};
 use apprentice::ids::{RequestId, UserId};
@@ -54,7 +54,7 @@ impl Peer<'_> {
     fn settle(&self, counts: &mut Counts) {
         let id = fresh_id();
         let user = UserId::new("mallory").unwrap();
-        self.send(&[encode_request(&Request { id, user, ask: Ask::Hello })]);
+        self.send(&[encode_request(&Request { id, user, ask: Ask::Door(DoorAsk::Hello) })]);
         loop {
             let ready = self.socket.poll(zmq::POLLIN, 60_000).unwrap();
             assert_eq!(ready, 1, "no answer within a minute; {:?}", self.service.counts());
@@ -104,7 +104,9 @@ pub fn run(messages: usize, seed: u64) {
                 let mut long = encode_request(&Request {
                     id: RequestId([1; 16]),
                     user: UserId::new("mallory").unwrap(),
-                    ask: Ask::Command(Command::Say { utterance: "x".repeat(FRAME_BYTES_MAX) }),
+                    ask: Ask::Person(PersonAsk::Command(Command::Say {
+                        utterance: "x".repeat(FRAME_BYTES_MAX),
+                    })),
                 });
                 long.resize(FRAME_BYTES_MAX + dice.below(FRAME_BYTES_MAX), b'x');
                 peer.send(&[long]);

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use apprentice::actors::{
-    ArchiveAsk, Ask, Frame, HeadView, Heads, PlainRecords, PlainView, Response, SealedRecords,
-    SealedView, TenantAsk, TenantVerb,
+    ArchiveAsk, Ask, DoorAsk, Frame, HeadView, Heads, PersonAsk, PlainRecords, PlainView, Response,
+    SealedRecords, SealedView, TenantAsk, TenantVerb,
 };
 use apprentice::cli::TranscriptFile;
 use apprentice::events::{self, EventKind, Head, Header};
@@ -96,20 +96,22 @@ pub fn requests() -> Vec<Vec<u8>> {
     let say = Command::Say { utterance: "ring the brass bell".to_owned() };
     let explains = Seq::new(3).unwrap();
     let teach = Command::Teach { explains, actions: vec![1, 2], on_clash: OnClash::Ask };
-    let asks =
-        stages.map(|stage| Ask::Command(Command::StartEpisode { stage })).into_iter().chain([
-            Ask::Command(say),
-            Ask::Command(Command::Done),
-            Ask::Command(teach),
-            Ask::Command(Command::FinishTeaching),
-            Ask::Command(Command::Forget { lesson: explains }),
-            Ask::Command(Command::Close { reason: "enough".to_owned() }),
-            Ask::Query(Query::Status),
-            Ask::Query(Query::Look),
-            Ask::Query(Query::Known),
-            Ask::Wait { seconds: 1 },
-            Ask::Hello,
-            Ask::Feed,
+    let asks = stages
+        .map(|stage| Ask::Person(PersonAsk::Command(Command::StartEpisode { stage })))
+        .into_iter()
+        .chain([
+            Ask::Person(PersonAsk::Command(say)),
+            Ask::Person(PersonAsk::Command(Command::Done)),
+            Ask::Person(PersonAsk::Command(teach)),
+            Ask::Person(PersonAsk::Command(Command::FinishTeaching)),
+            Ask::Person(PersonAsk::Command(Command::Forget { lesson: explains })),
+            Ask::Person(PersonAsk::Command(Command::Close { reason: "enough".to_owned() })),
+            Ask::Person(PersonAsk::Query(Query::Status)),
+            Ask::Person(PersonAsk::Query(Query::Look)),
+            Ask::Person(PersonAsk::Query(Query::Known)),
+            Ask::Person(PersonAsk::Wait { seconds: 1 }),
+            Ask::Door(DoorAsk::Hello),
+            Ask::Door(DoorAsk::Feed),
             Ask::Archive(ArchiveAsk::Heads { after: Some(StreamKey([5; 16])), limit: 7 }),
             Ask::Archive(ArchiveAsk::Sealed {
                 stream: StreamKey([5; 16]),

@@ -25,6 +25,11 @@ impl Disturbed {
         self.left.store(records.unwrap_or(NEVER), Ordering::Relaxed);
     }
 
+    /// Whether the log's own crash has come.
+    pub fn is_down(&self) -> bool {
+        self.inner.crashed()
+    }
+
     fn read_one(&self) -> Result<(), ReadError> {
         match self.left.load(Ordering::Relaxed) {
             NEVER => Ok(()),

@@ -1,6 +1,6 @@
 //! What people ask, how often they ask again, and what they have heard: the ledger.
 
-use apprentice::ids::{RequestId, StreamId, UserId};
+use apprentice::ids::{RequestId, StreamId, TenantId, UserId};
 use apprentice::session::{Command, OnClash, Phase, Reply, Session};
 use apprentice::world::Stage;
 
@@ -9,8 +9,11 @@ use crate::support::toy::Bells;
 
 /// One person and everything that they asked, oldest first.
 pub struct Person {
+    pub tenant: TenantId,
     pub user: UserId,
     pub stream: StreamId,
+    /// How often the name was erased.
+    pub era: u64,
     pub asked: Vec<Asked>,
 }
 
@@ -48,6 +51,13 @@ const SAYINGS: [&str; 12] = [
 ];
 
 impl Person {
+    /// They were erased: whoever uses the name now is somebody new.
+    pub fn begin_anew(&mut self, stream: StreamId) {
+        self.era += 1;
+        self.stream = stream;
+        self.asked.clear();
+    }
+
     pub fn unanswered(&self) -> Vec<usize> {
         let open = |index: &usize| self.asked[*index].heard == Heard::Nothing;
         (0..self.asked.len()).filter(open).collect()

@@ -2,5 +2,6 @@
 #![allow(dead_code)]
 
 pub mod diary;
+pub mod front;
 pub mod ran;
 pub mod toy;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use apprentice::actors::{ArchiveAsk, Ask, Response};
+use apprentice::actors::{ArchiveAsk, Ask, DoorAsk, Response};
 use apprentice::frontends::{Client, Counts, CurveKey, Identity, wire};
 use apprentice::ids::{PublicKey, RequestId, StreamId, StreamKey, TenantId, UserId};
 use apprentice::learning::Recipe;
@@ -72,7 +72,7 @@ impl Service {
     /// Takes a key back while its connection is open.
     pub fn make_stale(&self, lab: &Lab, key: &str, wire: &mut Wire) {
         let id = RequestId([0x77; 16]);
-        let (user, ask) = (UserId::new("ada").unwrap(), Ask::Hello);
+        let (user, ask) = (UserId::new("ada").unwrap(), Ask::Door(DoorAsk::Hello));
         wire.send(&[wire::encode_request(&wire::Request { id, user, ask })]);
         wire.reply_to(id);
         let key = lab.public(key);

@@ -1,14 +1,13 @@
 //! What actors share, and what they do outside the mailbox: waking, training, remembering.
 
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use actix::Addr;
 
 use super::awake::Awake;
 use super::meters::Meters;
-use super::trainer::{Run, Seat, Train, Trainer};
+use super::seat::NewSession;
+use super::trainer::{Run, Slot, Train, Trainer};
 use super::{ErrorCode, Failure, Growths, Registrar, Response};
 use crate::events::Record;
 use crate::fairness::Trainings;
@@ -17,104 +16,52 @@ use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
 use crate::sabotage;
-use crate::session::{Command, Proposed, Session, Turn};
+use crate::session::Session;
 use crate::store::{EventLog, KeyError, Store};
 use crate::world::Domain;
 
-/// What the actors are made from, before there is an actix system.
-pub(super) struct Parts<D: Domain> {
+/// What exists before there is an actix system.
+pub(super) struct Common<D: Domain> {
     pub domain: Arc<D>,
     pub store: Store,
-    pub recipe: Recipe,
-    pub recipe_text: String,
-    /// Trainings at once.
-    pub trainers: usize,
+    pub new: Arc<NewSession>,
     pub minds: Arc<Minds>,
     pub meters: Arc<Meters>,
     pub growths: Growths,
     pub failure: Failure,
-    pub open: Awake,
-}
-
-impl<D: Domain> Parts<D> {
-    /// Trains the mind that new people start with. It holds nobody's words, so everybody shares it.
-    pub fn with_base_mind(self) -> Result<Seeded<D>, String> {
-        let train = || learning::train(&*self.domain, &self.recipe, &[]);
-        let base = catch_unwind(AssertUnwindSafe(train))
-            .map_err(|panic| panic_words(&*panic))?
-            .map_err(|error| error.to_string())?;
-        Ok(Seeded { parts: self, base: Arc::new(base) })
-    }
-}
-
-/// [`Parts`] and the base mind.
-pub(super) struct Seeded<D: Domain> {
-    parts: Parts<D>,
-    base: Arc<Mind>,
+    // Last, so that it ends after the store was closed: fields are dropped in this order.
+    pub _open: Awake,
 }
 
 /// What the actors share. Lives as long as anyone uses the store.
-pub(super) struct Life<D: Domain> {
-    domain: Arc<D>,
-    store: Store,
-    recipe: Recipe,
-    recipe_text: String,
-    base: Arc<Mind>,
-    minds: Arc<Minds>,
-    meters: Arc<Meters>,
-    growths: Growths,
-    trainer: OnceLock<Addr<Trainer<D>>>,
+pub(super) struct Shared<D: Domain> {
     registrar: Registrar,
+    trainer: OnceLock<Addr<Trainer<D>>>,
     trainings: Mutex<Trainings<Train<D>>>,
-    failure: Failure,
-    // Last, so that it ends after the store was closed: fields are dropped in this order.
-    _open: Awake,
+    common: Common<D>,
 }
 
-impl<D: Domain> Life<D> {
+impl<D: Domain> Shared<D> {
     /// Must run on the actix system's thread, where `trainer` starts its threads.
     pub fn start(
-        seeded: Seeded<D>,
+        common: Common<D>,
         registrar: Registrar,
-        trainer: impl FnOnce(Arc<Life<D>>, usize) -> Addr<Trainer<D>>,
-    ) -> Arc<Life<D>> {
-        let Seeded { parts, base } = seeded;
-        let Parts {
-            domain,
-            store,
-            recipe,
-            recipe_text,
-            trainers,
-            minds,
-            meters,
-            growths,
-            failure,
-            open,
-        } = parts;
-        let life = Arc::new(Life {
-            domain,
-            store,
-            recipe,
-            recipe_text,
-            base,
-            minds,
-            meters,
-            growths,
-            trainer: OnceLock::new(),
+        trainers: usize,
+        trainer: impl FnOnce(Arc<Shared<D>>, usize) -> Addr<Trainer<D>>,
+    ) -> Arc<Shared<D>> {
+        let shared = Arc::new(Shared {
             registrar,
+            trainer: OnceLock::new(),
             trainings: Mutex::new(Trainings::new(trainers)),
-            failure,
-            _open: open,
+            common,
         });
-        let address = trainer(life.clone(), trainers.max(1));
-        assert!(life.trainer.set(address).is_ok(), "it was just made and is set once");
-        life
+        let address = trainer(shared.clone(), trainers.max(1));
+        assert!(shared.trainer.set(address).is_ok(), "it was just made and is set once");
+        shared
     }
-}
 
-impl<D: Domain> Life<D> {
     pub fn log(&self) -> &dyn EventLog {
-        &*self.store.log
+        &*self.common.store.log
     }
 
     /// Who writes the tenants' own streams.
@@ -124,20 +71,20 @@ impl<D: Domain> Life<D> {
 
     /// Who is told of what became durable.
     pub fn growths(&self) -> &Growths {
-        &self.growths
+        &self.common.growths
     }
 
-    /// The recipe that new people start with.
-    pub fn recipe(&self) -> &Recipe {
-        &self.recipe
+    /// What new people start with.
+    pub fn new_session(&self) -> &Arc<NewSession> {
+        &self.common.new
     }
 
     pub fn failure(&self) -> &Failure {
-        &self.failure
+        &self.common.failure
     }
 
     pub fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError> {
-        self.store.keys.stream_id(tenant, user)
+        self.common.store.keys.stream_id(tenant, user)
     }
 
     /// The wall clock; a session makes it monotone with `next_at`.
@@ -150,14 +97,14 @@ impl<D: Domain> Life<D> {
     /// - returns: whether there was a place for it.
     pub fn queue_training(self: &Arc<Self>, train: Train<D>) -> bool {
         let stream = train.stream.clone();
-        let quota = self.meters.quotas(&stream.tenant).trainings_waiting;
+        let quota = self.common.meters.quotas(&stream.tenant).trainings_waiting;
         let most = quota.map_or(TRAIN_QUEUE_MAX, |quota| TRAIN_QUEUE_MAX.min(quota as usize));
         let queued = self.trainings().push(&stream, train, most);
         // What it took the place of was asked for by a former actor of the same person, who is
         // gone.
         let taken = queued.is_ok();
         if !taken {
-            self.meters.note_training_refused(&stream.tenant);
+            self.common.meters.note_training_refused(&stream.tenant);
         }
         self.hand_out_trainings();
         taken
@@ -181,8 +128,8 @@ impl<D: Domain> Life<D> {
         loop {
             let next = self.trainings().start();
             let Some((stream, train)) = next else { return };
-            let seat = Seat { life: self.clone(), stream };
-            trainer.do_send(Run { train, seat });
+            let slot = Slot { shared: self.clone(), stream };
+            trainer.do_send(Run { train, slot });
         }
     }
 
@@ -191,17 +138,12 @@ impl<D: Domain> Life<D> {
         self.trainings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The mind that new people start with.
-    pub fn base(&self) -> &Arc<Mind> {
-        &self.base
-    }
-
     pub fn mind(&self, tenant: &TenantId, digest: Digest) -> Option<Arc<Mind>> {
-        self.minds.get(tenant, digest)
+        self.common.minds.get(tenant, digest)
     }
 
     pub fn remember(&self, tenant: &TenantId, mind: Arc<Mind>) {
-        self.minds.put(tenant, mind);
+        self.common.minds.put(tenant, mind);
     }
 
     /// The records `first` to `last` of a stream, for answering a request again.
@@ -224,63 +166,31 @@ impl<D: Domain> Life<D> {
 ///
 /// - errors: what to answer to whoever asks for this person.
 pub(super) fn wake<D: Domain>(
-    life: &Life<D>,
+    shared: &Shared<D>,
     stream: &StreamId,
 ) -> Result<Session<D>, Box<Response>> {
     // Never pushed out of the memory of minds for long: everybody begins with it.
-    life.remember(&stream.tenant, life.base.clone());
-    replay::rebuild(&life.domain, &life.store, stream, &life.minds).map_err(|error| {
+    shared.remember(&stream.tenant, shared.common.new.base.clone());
+    let Common { domain, store, minds, .. } = &shared.common;
+    replay::rebuild(domain, store, stream, minds).map_err(|error| {
         let message = format!("this session cannot be woken: {error}");
         Box::new(Response::error(ErrorCode::Unavailable, message))
     })
-}
-
-/// Whether somebody new may be called that. People who were recorded keep the name that they have.
-///
-/// - errors: what to answer instead.
-pub(super) fn check_name(user: &UserId) -> Result<(), Box<Response>> {
-    user.check_new().map_err(|error| {
-        let message = format!("nobody new can be called that: {error}");
-        Box::new(Response::error(ErrorCode::Refused, message))
-    })
-}
-
-/// The turn that opens the session of somebody new.
-///
-/// - errors: what to answer instead.
-pub(super) fn open<D: Domain>(
-    life: &Life<D>,
-    session: &Session<D>,
-    user: &UserId,
-) -> Result<Turn, Box<Response>> {
-    let command = Command::Open {
-        user: user.clone(),
-        recipe_text: life.recipe_text.clone(),
-        mind: life.base.digest(),
-    };
-    let proposed = session.propose(&command, fresh_request(), session.next_at(life.now()));
-    let unavailable = |reason: String| Box::new(Response::error(ErrorCode::Unavailable, reason));
-    match proposed {
-        Ok(Proposed::Turn(turn)) => Ok(turn),
-        Ok(Proposed::Repeat { .. }) => unreachable!("a fresh request id was not answered before"),
-        Ok(Proposed::Defect(divergence)) => Err(unavailable(divergence.to_string())),
-        Err(rejection) => Err(unavailable(rejection.to_string())),
-    }
 }
 
 /// Trains a mind and keeps its bytes, before any record names them. Runs on a trainer's thread.
 ///
 /// - errors: the reason, in the trainer's words.
 pub(super) fn train<D: Domain>(
-    life: &Life<D>,
+    shared: &Shared<D>,
     stream: &StreamId,
     recipe: &Recipe,
     lessons: &[Lesson<D::Scene, D::Task>],
 ) -> Result<Arc<Mind>, String> {
     sabotage::point("training");
-    let mind =
-        learning::train(&*life.domain, recipe, lessons).map_err(|error| error.to_string())?;
-    if let Err(error) = replay::keep_mind(&life.store, stream, &mind) {
+    let mind = learning::train(&*shared.common.domain, recipe, lessons)
+        .map_err(|error| error.to_string())?;
+    if let Err(error) = replay::keep_mind(&shared.common.store, stream, &mind) {
         // The bytes of a mind are a cache: without them the next waking trains again.
         tracing::warn!(%stream, %error, "the mind's bytes were not kept");
     }
@@ -288,16 +198,24 @@ pub(super) fn train<D: Domain>(
 }
 
 /// Keeps a snapshot, so that the next waking folds less. A cache: failing costs time only.
-pub(super) fn keep_snapshot<D: Domain>(life: &Life<D>, stream: &StreamId, session: &Session<D>) {
-    if let Err(reason) = replay::keep_snapshot(&life.store, stream, session) {
+pub(super) fn keep_snapshot<D: Domain>(
+    shared: &Shared<D>,
+    stream: &StreamId,
+    session: &Session<D>,
+) {
+    if let Err(reason) = replay::keep_snapshot(&shared.common.store, stream, session) {
         tracing::warn!(%stream, %reason, "no snapshot was kept");
     }
 }
 
 /// Forgets the bytes of minds that nobody will ask for again.
-pub(super) fn forget_old_minds<D: Domain>(life: &Life<D>, stream: &StreamId, session: &Session<D>) {
+pub(super) fn forget_old_minds<D: Domain>(
+    shared: &Shared<D>,
+    stream: &StreamId,
+    session: &Session<D>,
+) {
     let current: Vec<Digest> = session.mind().iter().map(|mind| mind.digest()).collect();
-    if let Err(reason) = life.store.models.keep_only(stream, &current) {
+    if let Err(reason) = shared.common.store.models.keep_only(stream, &current) {
         tracing::warn!(%stream, %reason, "old minds were not dropped");
     }
 }
@@ -307,11 +225,4 @@ pub(super) fn fresh_request() -> RequestId {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).expect("the operating system gives random bytes");
     RequestId(bytes)
-}
-
-/// What a panic said.
-pub(super) fn panic_words(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a panic without words".to_owned())
 }

@@ -1,0 +1,24 @@
+use std::any::Any;
+
+use super::{ErrorCode, Response};
+
+/// The answer to a request that met a panic. Says so to the operator, too.
+pub(super) fn defect(doing: &str, panic: &(dyn Any + Send)) -> Response {
+    let words = panic_words(panic);
+    // The words of a panic may hold what a person said: they are for who looks closely.
+    tracing::error!(doing, "a defect; the actor is replaced by one from the log");
+    tracing::debug!(doing, %words, "what the defect said");
+    Response::error(
+        ErrorCode::Internal,
+        format!(
+            "a defect of apprentice while {doing}; nothing was lost, please report it: {words}"
+        ),
+    )
+}
+
+/// What a panic said.
+pub(super) fn panic_words(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "a panic without words".to_owned())
+}

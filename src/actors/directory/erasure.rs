@@ -1,0 +1,56 @@
+//! Erase a person: their seat goes to sleep for good, nobody wakes them meanwhile, and when nothing
+//! of theirs is under way any more, the registrar destroys their key.
+
+use std::time::Duration;
+
+use super::{Directory, DirectoryEffect};
+use crate::actors::presence::Presence;
+use crate::ids::StreamId;
+
+/// An erasure that is under way.
+pub(super) struct Erasure<E> {
+    /// What the person's seat has to do; none when they slept.
+    presence: Option<Presence>,
+    /// None once the key is being destroyed.
+    caller: Option<E>,
+    looks: u32,
+}
+
+/// How often it is looked whether the person is idle.
+const LOOK: Duration = Duration::from_millis(5);
+/// How often at most: 20 seconds for requests and trainings in hand.
+const LOOKS_MAX: u32 = 4_000;
+
+impl<L, E> Directory<L, E> {
+    pub(super) fn erase(&mut self, stream: StreamId, caller: E) {
+        // When everybody is sent to sleep, an append may still be under way.
+        if self.stopping || self.leaving.contains_key(&stream) {
+            return self.effects.push(DirectoryEffect::StillBusy { caller });
+        }
+        let presence = self.entries.get(&stream).map(|entry| entry.presence.clone());
+        let erasure = Erasure { presence, caller: Some(caller), looks: 0 };
+        self.leaving.insert(stream.clone(), erasure);
+        self.look(stream);
+    }
+
+    /// Goes on with an erasure when the person is idle, and gives up when they are busy for too
+    /// long.
+    pub(super) fn look(&mut self, stream: StreamId) {
+        let Some(erasure) = self.leaving.get_mut(&stream) else { return };
+        erasure.looks += 1;
+        let is_idle = erasure.presence.as_ref().is_none_or(Presence::is_idle);
+        if !is_idle && erasure.looks < LOOKS_MAX {
+            return self.effects.push(DirectoryEffect::LookAgain { stream, after: LOOK });
+        }
+        let Some(caller) = erasure.caller.take() else { return };
+        if !is_idle {
+            self.leaving.remove(&stream);
+            return self.effects.push(DirectoryEffect::StillBusy { caller });
+        }
+        // Struck off first: nothing in the person's name can be appended after this.
+        if let Some(generation) = self.generation_of(&stream) {
+            self.strike_off(&stream, generation);
+        }
+        self.effects.push(DirectoryEffect::Erase { stream, caller });
+    }
+}

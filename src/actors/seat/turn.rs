@@ -1,0 +1,303 @@
+//! One turn: decide, append, and only then apply and answer. The only place that does it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use super::{Effect, Seat, Stage};
+use crate::actors::defect::defect;
+use crate::actors::response::{ErrorCode, Response, Waited};
+use crate::events::{Durable, Record, Report};
+use crate::ids::{Digest, RequestId, Timestamp};
+use crate::learning::{self, Mind};
+use crate::sabotage;
+use crate::session::{Command, Divergence, Phase, Proposed, Reply, Session, Told, Turn};
+use crate::store::AppendError;
+use crate::world::Domain;
+
+/// A command to carry out.
+pub(super) struct Work<C> {
+    pub command: Command,
+    pub request: RequestId,
+    /// What the wall clock read; the session makes it monotone.
+    pub at: Timestamp,
+    /// None for what the service itself asks.
+    pub caller: Option<C>,
+}
+
+/// What is under way.
+pub(super) enum Doing<C> {
+    /// Recording who is new; their first command comes after it.
+    Opening(Work<C>, RequestId),
+    Appending(Work<C>),
+    /// Reading again what answered this request id before.
+    ReadingBack(Work<C>),
+    /// Finding the mind that the records name now.
+    Equipping(Work<C>, Reply),
+}
+
+impl<C> Doing<C> {
+    pub fn into_caller(self) -> Option<C> {
+        match self {
+            Doing::Opening(work, _) | Doing::Appending(work) => work.caller,
+            Doing::ReadingBack(work) | Doing::Equipping(work, _) => work.caller,
+        }
+    }
+}
+
+impl<D: Domain, C> Seat<D, C> {
+    /// Decides, and asks for the append.
+    ///
+    /// - `fresh`: a request id for the record that somebody is new.
+    pub(super) fn perform(&mut self, work: Work<C>, fresh: RequestId) {
+        let Stage::Awake(session) = &self.stage else { return };
+        let is_new = !session.is_open();
+        if is_new && let Err(error) = self.user.check_new() {
+            let message = format!("nobody new can be called that: {error}");
+            return self.answer(work.caller, Response::error(ErrorCode::Refused, message));
+        }
+        let at = session.next_at(work.at);
+        // Rust cannot know it, but `propose` only reads: a panic leaves the session as it was.
+        let proposed = catch_unwind(AssertUnwindSafe(|| {
+            sabotage::point("handler");
+            session.propose(&work.command, work.request, at)
+        }));
+        match proposed {
+            // What is declined makes nobody; this is the first command that is not.
+            Ok(Ok(Proposed::Turn(_))) if is_new => self.open(work, fresh),
+            Ok(Ok(Proposed::Turn(turn))) => self.append(turn, Doing::Appending(work)),
+            Ok(Ok(Proposed::Repeat { first, last })) => {
+                self.effects.push(Effect::ReadBack { first, last });
+                self.doing = Some(Doing::ReadingBack(work));
+            }
+            Ok(Ok(Proposed::Defect(divergence))) => {
+                let response = self.cannot_be_applied(session, divergence);
+                self.answer(work.caller, response);
+            }
+            Ok(Err(rejection)) => self.answer(work.caller, rejection.into()),
+            Err(panic) => {
+                self.answer(work.caller, defect("deciding", &*panic));
+                self.leave();
+            }
+        }
+    }
+
+    fn append(&mut self, turn: Turn, doing: Doing<C>) {
+        let Turn { after, batch } = turn;
+        self.effects.push(Effect::Append { after, batch });
+        self.doing = Some(doing);
+    }
+
+    /// Records who is new. Their first command is decided once that is durable.
+    fn open(&mut self, first: Work<C>, fresh: RequestId) {
+        let Stage::Awake(session) = &self.stage else { return };
+        let command = Command::Open {
+            user: self.user.clone(),
+            recipe_text: self.new.recipe_text.clone(),
+            mind: self.new.base.digest(),
+        };
+        let reason = match session.propose(&command, fresh, session.next_at(first.at)) {
+            Ok(Proposed::Turn(turn)) => return self.append(turn, Doing::Opening(first, fresh)),
+            Ok(Proposed::Repeat { .. }) => "a request id was drawn twice".to_owned(),
+            Ok(Proposed::Defect(divergence)) => divergence.to_string(),
+            Err(rejection) => rejection.to_string(),
+        };
+        self.answer(first.caller, Response::error(ErrorCode::Unavailable, reason));
+    }
+
+    pub(super) fn appended(&mut self, result: Result<Durable, AppendError>) {
+        match (self.doing.take(), result) {
+            (Some(Doing::Opening(first, fresh)), Ok(durable)) => self.opened(first, fresh, durable),
+            (Some(Doing::Appending(work)), Ok(durable)) => self.settle(work, durable),
+            (Some(Doing::Opening(work, _) | Doing::Appending(work)), Err(error)) => {
+                self.append_failed(work, &error);
+            }
+            (other, _) => self.doing = other,
+        }
+    }
+
+    fn opened(&mut self, first: Work<C>, fresh: RequestId, durable: Durable) {
+        let Stage::Awake(session) = &mut self.stage else { return };
+        let settled = session.settle(&durable);
+        if settled.is_ok() {
+            session.install(self.new.base.clone());
+        }
+        self.effects.push(Effect::Publish(durable));
+        match settled {
+            Ok(_) => {
+                tracing::info!(stream = %self.stream, "somebody new");
+                self.perform(first, fresh);
+            }
+            Err(divergence) => self.disagrees(first.caller, &divergence),
+        }
+    }
+
+    /// Makes a durable turn true.
+    fn settle(&mut self, work: Work<C>, durable: Durable) {
+        let Stage::Awake(session) = &mut self.stage else { return };
+        // A panic may leave the session half changed: it is then dropped, never used again.
+        let settled = catch_unwind(AssertUnwindSafe(|| {
+            sabotage::point("settling");
+            session.settle(&durable)
+        }));
+        self.effects.push(Effect::Publish(durable));
+        match settled {
+            Ok(Ok(reply)) => self.equip(work, reply),
+            Ok(Err(divergence)) => self.disagrees(work.caller, &divergence),
+            Err(panic) => {
+                self.answer(work.caller, defect("applying", &*panic));
+                self.leave();
+            }
+        }
+    }
+
+    /// Has the mind found that the session's records name, when it is another one now.
+    fn equip(&mut self, work: Work<C>, reply: Reply) {
+        let Stage::Awake(session) = &self.stage else { return };
+        if let Command::FinishRetrain { .. } = work.command {
+            self.last_told = reply.told.clone();
+        }
+        match session.mind_wanted() {
+            None => self.finish(work, reply),
+            Some(mind) => {
+                self.effects.push(Effect::FindMind(mind));
+                self.doing = Some(Doing::Equipping(work, reply));
+            }
+        }
+    }
+
+    pub(super) fn found(&mut self, mind: Option<Arc<Mind>>) {
+        let Some(Doing::Equipping(work, reply)) = self.doing.take() else { return };
+        let Stage::Awake(session) = &mut self.stage else { return };
+        match mind {
+            Some(mind) => {
+                session.install(mind);
+                self.finish(work, reply);
+            }
+            // Rare, the memory of minds being large. Waking again finds it in the store or trains it.
+            None => {
+                self.answer(work.caller, Response::Reply(reply));
+                self.leave();
+            }
+        }
+    }
+
+    /// What is due after every turn, and the answer.
+    fn finish(&mut self, work: Work<C>, reply: Reply) {
+        let trained = matches!(work.command, Command::FinishRetrain { .. });
+        if trained {
+            self.effects.push(Effect::ForgetOldMinds);
+        }
+        self.ask_for_training();
+        self.answer_waiters();
+        let told = |is: fn(&Told) -> bool| reply.told.iter().any(is);
+        if told(|told| matches!(told, Told::EpisodeEnded { .. })) {
+            self.effects.push(Effect::KeepSnapshot);
+        }
+        if told(|told| matches!(told, Told::EpisodeEnded { .. } | Told::Closed { .. })) {
+            self.effects.push(Effect::CloseSegments);
+        }
+        self.answer(work.caller, Response::Reply(reply));
+    }
+
+    fn answer_waiters(&mut self) {
+        let Stage::Awake(session) = &self.stage else { return };
+        if session.phase() == Phase::Learning {
+            return;
+        }
+        let waited = Waited { status: session.status(), told: self.last_told.clone() };
+        for (_, caller) in std::mem::take(&mut self.waiters) {
+            let response = Response::Waited(waited.clone());
+            self.effects.push(Effect::Answer { caller, response });
+        }
+    }
+
+    /// The state did not change: the turn is dropped. Only when it is certain that nothing was
+    /// appended does the seat go on. Otherwise a new one reads what the log says.
+    fn append_failed(&mut self, work: Work<C>, error: &AppendError) {
+        tracing::warn!(stream = %self.stream, %error, "an append failed");
+        let response = match error.retry_after_ms() {
+            Some(after_ms) => Response::busy(error.to_string(), after_ms),
+            None => Response::error(ErrorCode::Unavailable, error.to_string()),
+        };
+        self.answer(work.caller, response);
+        if error.is_fatal() {
+            self.effects.push(Effect::Fatal(error.to_string()));
+        }
+        match error.is_certain() {
+            // A training that could not be recorded is still due.
+            true => self.ask_for_training(),
+            false => self.leave(),
+        }
+    }
+
+    /// The answer to a request id that was answered before, by these records.
+    pub(super) fn read_back(&mut self, records: Result<Vec<Record>, String>) {
+        let Some(Doing::ReadingBack(work)) = self.doing.take() else { return };
+        let Stage::Awake(session) = &self.stage else { return };
+        let records = match records {
+            Ok(records) => records,
+            Err(reason) => {
+                let response = Response::error(ErrorCode::Unavailable, reason);
+                return self.answer(work.caller, response);
+            }
+        };
+        // A stage may be set once more for it, in the same code that may have panicked before.
+        let repeated = catch_unwind(AssertUnwindSafe(|| session.repeat(&work.command, &records)));
+        let response = match repeated {
+            Ok(Ok(reply)) => Response::Reply(reply),
+            Ok(Err(rejection)) => rejection.into(),
+            Err(panic) => defect("comparing a repeated request", &*panic),
+        };
+        self.answer(work.caller, response);
+    }
+
+    /// The result of a training enters as an utterance does.
+    pub(super) fn trained(
+        &mut self,
+        recipe: Digest,
+        outcome: Result<Arc<Mind>, String>,
+        at: Timestamp,
+        fresh: RequestId,
+    ) {
+        self.training = false;
+        let outcome = outcome.map(|mind| {
+            let learning::Report { exemplars, threshold, figures } = mind.report().clone();
+            let digest = mind.digest();
+            self.effects.push(Effect::Remember(mind));
+            (digest, Report { exemplars, threshold, figures })
+        });
+        let command = Command::FinishRetrain { recipe, outcome };
+        self.perform(Work { command, request: fresh, at, caller: None }, fresh);
+        if self.doing.is_none() {
+            // Declined: another training may be due instead.
+            self.ask_for_training();
+        }
+    }
+
+    /// The answer to a command whose events the fold refuses. Nothing was appended, and the session
+    /// did not change: it goes on.
+    fn cannot_be_applied(&self, session: &Session<D>, divergence: Divergence) -> Response {
+        // Both values may hold what a person said; the digest finds the state that shows it again.
+        let Divergence { seq, field, .. } = &divergence;
+        let (stream, state) = (&self.stream, session.state_digest());
+        tracing::error!(
+            %stream, %seq, field, %state,
+            "a defect: what was decided cannot be applied; nothing was recorded"
+        );
+        tracing::debug!(%stream, %divergence, "what the defect was");
+        Response::error(
+            ErrorCode::Internal,
+            format!(
+                "a defect of apprentice while deciding; nothing was recorded, please report it: \
+                 {divergence}"
+            ),
+        )
+    }
+
+    /// The records are other ones than the state expects: the seat reads them from the log.
+    fn disagrees(&mut self, caller: Option<C>, divergence: &Divergence) {
+        tracing::error!(stream = %self.stream, %divergence, "binary and log disagree");
+        self.answer(caller, Response::error(ErrorCode::Internal, divergence.to_string()));
+        self.leave();
+    }
+}

@@ -1,0 +1,36 @@
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::NewSession;
+use crate::actors::defect::defect;
+use crate::actors::response::{Rejected, Response};
+use crate::session::{Query, RejectionCode, Session, Status};
+use crate::world::Domain;
+
+/// - errors: what to answer when the session panicked; it is then to be left.
+pub(super) fn answer<D: Domain>(
+    new: &NewSession,
+    session: &Session<D>,
+    query: Query,
+) -> Result<Response, Box<Response>> {
+    catch_unwind(AssertUnwindSafe(|| match query {
+        Query::Status => Response::Status(status(new, session)),
+        Query::Known if !session.is_open() => Response::Known(session.known_before(&new.base)),
+        Query::Known => Response::Known(session.known()),
+        Query::Look => match session.look() {
+            Some(view) => Response::Look(view),
+            None => Response::Rejected(Rejected {
+                code: RejectionCode::WrongPhase,
+                message: "there is nothing to see before the first episode; start one".to_owned(),
+            }),
+        },
+    }))
+    .map_err(|panic| Box::new(defect("looking", &*panic)))
+}
+
+/// Of a name that nothing was recorded of: what its bearer would start with.
+pub(super) fn status<D: Domain>(new: &NewSession, session: &Session<D>) -> Status {
+    match session.is_open() {
+        true => session.status(),
+        false => session.status_before(&new.recipe, &new.base),
+    }
+}

@@ -1,0 +1,47 @@
+//! Defects that are built in on purpose, to see that the oracle sees them.
+
+use apprentice::invariants::Invariant;
+
+/// What the simulated service does wrong. The seat and the directory are the shipped ones: all of
+/// these are in how they are driven, which is where a service of their kind can go wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Defect {
+    None,
+    /// Answers before the log has said that the batch is durable.
+    AnswersEarly,
+    /// Gives a repeated request a new id.
+    ForgetsRequests,
+    /// Does not start the training that a seat asks for when it wakes.
+    ForgetsTrainings,
+    /// Takes a snapshot that holds an append of which it does not know whether it is durable.
+    SnapshotsAhead,
+    /// Lets the message that sends a seat to sleep overtake the requests that wait for it.
+    SleepOvertakes,
+    /// Stops a seat that cannot go on without telling the directory first.
+    LeavesByItself,
+    /// Counts a person as idle while their requests wait.
+    EvictsBusy,
+    /// Takes what an earlier seat of a person says as if the present one said it.
+    ForgetsGenerations,
+    /// Destroys a person's key while a seat speaks for them.
+    ErasesAtOnce,
+    /// Keys people by their name, whatever their lab.
+    MixesTenants,
+    /// Loses the order to close segments.
+    ForgetsSegments,
+}
+
+/// Each defect, and the laws it may be seen to break.
+pub const DEFECTS: [(Defect, &[Invariant]); 11] = [
+    (Defect::AnswersEarly, &[Invariant::DurableBeforeReply, Invariant::AnsweredOnce]),
+    (Defect::ForgetsRequests, &[Invariant::ExactlyOnce]),
+    (Defect::ForgetsTrainings, &[Invariant::NoLostWork]),
+    (Defect::SnapshotsAhead, &[Invariant::FoldAgrees]),
+    (Defect::SleepOvertakes, &[Invariant::AnsweredOnce]),
+    (Defect::LeavesByItself, &[Invariant::AnsweredOnce]),
+    (Defect::EvictsBusy, &[Invariant::SingleWriter]),
+    (Defect::ForgetsGenerations, &[Invariant::SingleWriter]),
+    (Defect::ErasesAtOnce, &[Invariant::SingleWriter]),
+    (Defect::MixesTenants, &[Invariant::ExactlyOnce, Invariant::DurableBeforeReply]),
+    (Defect::ForgetsSegments, &[Invariant::NoLostWork]),
+];
