@@ -214,7 +214,7 @@ fn self_test(before: &[&str], binary: &Path) -> String {
 
 #[test]
 fn builds_with_and_without_optimisation_train_the_same_minds() {
-    for variable in ["APPRENTICE_UNOPTIMISED_BINARY", "APPRENTICE_RELEASE_BINARY"] {
+    for variable in ["APPRENTICE_UNOPTIMISED_BINARY", "APPRENTICE_OPTIMISED_BINARY"] {
         if let Some(binary) = handed_over(variable) {
             self_test(&[], &binary);
         }
@@ -223,7 +223,7 @@ fn builds_with_and_without_optimisation_train_the_same_minds() {
 
 #[test]
 fn other_processors_train_the_same_minds() {
-    let Some(binary) = handed_over("APPRENTICE_RELEASE_BINARY") else { return };
+    let Some(binary) = handed_over("APPRENTICE_OPTIMISED_BINARY") else { return };
     if Command::new("qemu-x86_64").arg("--version").output().is_err() {
         return skip("there is no qemu-x86_64; on Debian: apt-get install qemu-user");
     }

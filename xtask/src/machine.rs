@@ -51,25 +51,46 @@ fn target() -> PathBuf {
 ///
 /// - errors: it does not build.
 pub fn release_binary() -> Result<PathBuf, String> {
-    run(
-        "cargo",
-        &["build", "--release", "--quiet", "--package", "apprentice", "--bin", "apprentice"],
-    )?;
+    let what = ["--quiet", "--package", "apprentice", "--bin", "apprentice"];
+    run("cargo", &[&["build", "--release"], &what[..]].concat())?;
     Ok(target().join("release/apprentice"))
 }
 
-/// The service without any optimisation. The packages it depends on are those of the development
-/// build: only our own are built once more, which a profile of its own would not allow.
+/// The service without any optimisation.
 ///
 /// - errors: it does not build.
 pub fn unoptimised_binary() -> Result<PathBuf, String> {
-    let own = "profile.dev.package.apprentice.opt-level=0";
-    let migrations = "profile.dev.package.apprentice-migrations.opt-level=0";
+    built_otherwise("unoptimised", &["opt-level=0"])
+}
+
+/// The service with our own packages built as for a release.
+///
+/// - errors: it does not build.
+pub fn optimised_binary() -> Result<PathBuf, String> {
+    built_otherwise(
+        "optimised",
+        &["opt-level=3", "debug-assertions=false", "overflow-checks=false", "debug=false"],
+    )
+}
+
+/// The service with our own packages built by other settings. The packages it depends on are those
+/// of the development build, so that they are not all built once more: a profile of its own would
+/// not allow that.
+fn built_otherwise(name: &str, settings: &[&str]) -> Result<PathBuf, String> {
+    let mut arguments = vec!["build".to_owned()];
+    for package in ["apprentice", "apprentice-migrations"] {
+        for setting in settings {
+            let setting = format!("profile.dev.package.{package}.{setting}");
+            arguments.extend(["--config".to_owned(), setting]);
+        }
+    }
     let what = ["--quiet", "--package", "apprentice", "--bin", "apprentice"];
-    run("cargo", &[&["build", "--config", own, "--config", migrations], &what[..]].concat())?;
+    arguments.extend(what.map(str::to_owned));
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    run("cargo", &arguments)?;
     // The next development build takes that place again.
     let (built, kept) =
-        (target().join("debug/apprentice"), target().join("unoptimised-apprentice"));
+        (target().join("debug/apprentice"), target().join(format!("{name}-apprentice")));
     std::fs::copy(&built, &kept).map_err(|e| format!("cannot copy {}: {e}", built.display()))?;
     Ok(kept)
 }
@@ -87,6 +108,7 @@ pub fn python() -> Result<PathBuf, String> {
     if answers(&path, &["-c", "import zmq, msgpack, cryptography"]) {
         return Ok(python);
     }
+    say("a Python environment in target/python");
     let made = run("python3", &["-m", "venv", &folder.display().to_string()]);
     if made.is_err() {
         debian("python3-venv", || answers("python3", &["-c", "import ensurepip"]))?;
@@ -97,11 +119,29 @@ pub fn python() -> Result<PathBuf, String> {
     Ok(python)
 }
 
+/// Says what is being installed, so that nobody wonders.
+fn say(what: &str) {
+    eprintln!("xtask: installing {what}");
+}
+
+/// Installs everything that [`crate::stage`] needs and this machine lacks.
+///
+/// - returns: sentences about what could not be installed and is not needed everywhere.
+/// - errors: what could not be installed and is needed.
+pub fn setup() -> Result<Vec<String>, String> {
+    python()?;
+    qemu()?;
+    cargo_deny()?;
+    let missing = disk_tools().err();
+    Ok(missing.into_iter().map(|it| format!("power cuts cannot be tried: {it}")).collect())
+}
+
 /// Installs a Debian package unless `present` says that it is there.
 pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
     if present() {
         return Ok(());
     }
+    say(package);
     run("apt-get", &["update", "--quiet"])?;
     run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", package])
 }
@@ -118,5 +158,8 @@ pub fn cargo_deny() -> Result<(), String> {
     if answers("cargo", &["deny", "--version"]) {
         return Ok(());
     }
-    run("cargo", &["install", "cargo-deny", "--version", "0.20.2", "--locked", "--quiet"])
+    say("cargo-deny 0.20.2");
+    // It runs once: a build without optimisation is there sooner.
+    let install = ["install", "cargo-deny", "--version", "0.20.2", "--locked", "--debug"];
+    run("cargo", &[&install[..], &["--quiet"]].concat())
 }

@@ -3,6 +3,7 @@
 mod budget;
 mod drills;
 mod machine;
+mod release;
 mod stage;
 
 use std::process::ExitCode;
@@ -27,6 +28,21 @@ enum Task {
         /// Fail at a stage that takes longer than xtask/budget.toml allows, instead of warning.
         #[arg(long)]
         enforce_budget: bool,
+    },
+    /// What one wants to know before every commit: format, lints, unit tests, the map.
+    ///
+    /// Takes under a minute when the build tree is warm.
+    Check,
+    /// Installs what the tests need and this Debian machine lacks, and says what it installs.
+    Setup,
+    /// What is checked before a release, beside `test`: the release build trains the same minds, two
+    /// release builds in different folders are the same bytes, and the long runs.
+    ///
+    /// Takes hours.
+    ReleaseCheck {
+        /// Leave out the long runs of the simulator, the kills and the power cuts.
+        #[arg(long)]
+        short: bool,
     },
     /// The simulator: as many seeds as wanted, in the release build.
     ///
@@ -92,6 +108,12 @@ enum Task {
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Test { only, enforce_budget } => stage::run_all(&only, enforce_budget),
+        Task::Check => stage::check(),
+        Task::Setup => machine::setup().map(|missing| {
+            missing.iter().for_each(|sentence| eprintln!("xtask: {sentence}"));
+            println!("this machine has what the tests need");
+        }),
+        Task::ReleaseCheck { short } => release::check(short),
         Task::Simulate { seeds, seed } => drills::simulate(seeds.unwrap_or(1), seed),
         Task::Crash { kills, seed } => drills::crash(kills, seed),
         Task::Powerloss { images, seed } => drills::powerloss(images, seed),
