@@ -6,26 +6,21 @@
 //! [`frontends`] carry. `ARCHITECTURE.md` is the map; its two tables are checked by
 //! `tests/tidy.rs`. Rooms below stand in storeys: imports point upwards on this list only.
 
-pub mod fairness;
-pub mod ids;
-pub mod invariants;
-pub mod limits;
-pub mod plain;
+pub use apprentice_core::{fairness, ids, invariants, language, limits, numerics, plain, sabotage};
+pub use apprentice_mind::{grounding, learning, parser};
 
-pub mod language;
-pub mod numerics;
+/// Where programs act: the trait of a world, and the worlds that there are.
+pub mod world {
+    pub use apprentice_core::world::*;
+    pub use apprentice_household as household;
+}
 
 pub mod events;
 pub mod evidence;
-pub mod grounding;
-pub mod learning;
-pub mod parser;
 pub mod session;
 pub mod tenancy;
-pub mod world;
 
 pub mod replay;
-mod sabotage;
 pub mod store;
 
 pub mod actors;

@@ -1,5 +1,5 @@
 //! The same lessons give the same mind, to the bit: in any build, with any kernel, on any processor,
-//! with any number of threads, and after a life in the log. A pinned digest (`data/pins.txt`) that
+//! with any number of threads, and after a life in the log. A pinned digest (`crates/mind/data/pins.txt`) that
 //! changes is a decision: say why in the commit, and in the changelog, since old logs then name
 //! minds that training no longer gives.
 
@@ -46,7 +46,7 @@ fn trained_minds_have_their_pinned_digests() {
     }
     assert!(
         wrong.is_empty(),
-        "trained here, and not what data/pins.txt says:\n{}\nsee the head of this file before \
+        "trained here, and not what crates/mind/data/pins.txt says:\n{}\nsee the head of this file before \
          changing a pin",
         wrong.join("\n")
     );

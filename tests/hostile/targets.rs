@@ -374,7 +374,7 @@ fn records() -> Vec<Target> {
 fn texts(household: &Arc<Household>) -> Vec<Target> {
     let recipes = ["default", "paper", "tiny"];
     let recipes = recipes.map(|name| Recipe::builtin(name).unwrap().as_bytes().to_vec());
-    let scenes = files("data/household", "toml");
+    let scenes = files("crates/household/data", "toml");
     let example = read_example(&scenes);
     let tasks = ["clean Mug CoffeeMachine", "heat Apple CounterTop", "free kitchen"];
     let (scene_world, task_world) = (household.clone(), household.clone());
@@ -421,7 +421,7 @@ fn endpoints() -> Vec<Vec<u8>> {
 
 fn read_example(scenes: &[Vec<u8>]) -> Vec<u8> {
     let example = scenes.iter().find(|bytes| text(bytes).contains("[[thing]]"));
-    example.expect("data/household/example_scene.toml").clone()
+    example.expect("crates/household/data/example_scene.toml").clone()
 }
 
 fn checkpoint(signer: &NoteSigner) -> String {

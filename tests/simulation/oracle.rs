@@ -1,5 +1,5 @@
 //! What must hold whatever happened: the fold of the log is the truth, and everything that anybody
-//! saw has to agree with it. Violations are named as in `src/invariants.rs`.
+//! saw has to agree with it. Violations are named as in `crates/core/src/invariants.rs`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -73,12 +73,21 @@ pub fn optimised_binary() -> Result<PathBuf, String> {
     )
 }
 
+/// The packages that a binary is built from and that are ours.
+const OWN: [&str; 5] = [
+    "apprentice",
+    "apprentice-core",
+    "apprentice-household",
+    "apprentice-migrations",
+    "apprentice-mind",
+];
+
 /// The service with our own packages built by other settings. The packages it depends on are those
 /// of the development build, so that they are not all built once more: a profile of its own would
 /// not allow that.
 fn built_otherwise(name: &str, settings: &[&str]) -> Result<PathBuf, String> {
     let mut arguments = vec!["build".to_owned()];
-    for package in ["apprentice", "apprentice-migrations"] {
+    for package in OWN {
         for setting in settings {
             let setting = format!("profile.dev.package.{package}.{setting}");
             arguments.extend(["--config".to_owned(), setting]);

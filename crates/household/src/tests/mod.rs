@@ -14,7 +14,7 @@ use super::{Household, Scene, Task};
 use crate::language::{Mention, Program, Symbol};
 use crate::world::{Domain, Edition, Stage};
 
-pub(super) const EXAMPLE: &str = include_str!("../../../../data/household/example_scene.toml");
+pub(super) const EXAMPLE: &str = include_str!("../../data/example_scene.toml");
 
 /// The example kitchen.
 pub(super) fn kitchen(task: &str) -> (Household, Scene, Task) {

@@ -169,7 +169,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::household::Household;
+    use crate::Household;
     use crate::world::{Domain, Stage};
 
     #[test]

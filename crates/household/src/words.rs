@@ -45,15 +45,11 @@ type NameTable = BTreeMap<String, BTreeMap<String, u32>>;
 /// What things are called, from `names.toml` and `words.toml`; in the second edition as changed by
 /// `names-2.toml` and `words-2.toml`.
 pub(super) fn lexicon(edition: Edition) -> Lexicon {
-    let mut names: NameTable =
-        embedded("names.toml", include_str!("../../../data/household/names.toml"));
-    let mut words: Words =
-        embedded("words.toml", include_str!("../../../data/household/words.toml"));
+    let mut names: NameTable = embedded("names.toml", include_str!("../data/names.toml"));
+    let mut words: Words = embedded("words.toml", include_str!("../data/words.toml"));
     if edition == Edition::Second {
-        let changed: NameTable =
-            embedded("names-2.toml", include_str!("../../../data/household/names-2.toml"));
-        let further: Further =
-            embedded("words-2.toml", include_str!("../../../data/household/words-2.toml"));
+        let changed: NameTable = embedded("names-2.toml", include_str!("../data/names-2.toml"));
+        let further: Further = embedded("words-2.toml", include_str!("../data/words-2.toml"));
         names.extend(changed);
         names.retain(|_, meant| !meant.is_empty());
         words.plurals.extend(further.plurals);
@@ -96,7 +92,7 @@ static HABITS: LazyLock<Arc<Habits>> = LazyLock::new(|| Arc::new(habits()));
 /// How recorded people used words for the primitives, from `habits.toml`.
 fn habits() -> Habits {
     let Counts { order, clauses, words } =
-        embedded("habits.toml", include_str!("../../../data/household/habits.toml"));
+        embedded("habits.toml", include_str!("../data/habits.toml"));
     let whole = words.values().chain([&clauses]).all(|row| row.len() == order.len());
     assert!(whole, "habits.toml counts each word for each primitive");
     Habits { order: order.iter().map(|name| Symbol::new(name)).collect(), clauses, words }
@@ -104,7 +100,7 @@ fn habits() -> Habits {
 
 /// What every user starts with, from `seeds.toml`.
 pub(super) fn seeds() -> SeedSet {
-    let seeds: Seeds = embedded("seeds.toml", include_str!("../../../data/household/seeds.toml"));
+    let seeds: Seeds = embedded("seeds.toml", include_str!("../data/seeds.toml"));
     let exemplar = |(utterance, program): (String, String)| Exemplar {
         utterance: LiftedUtterance::parse(&utterance),
         program: program.parse().expect("seeds.toml writes lifted programs"),

@@ -8,11 +8,11 @@ use super::words::nearest_word;
 use crate::language::Symbol;
 
 /// A kind of thing: `Mug`, `Fridge`. An index into the table of kinds, which is ordered by the
-/// number that `data/household/types.toml` gives each kind for ever.
+/// number that `data/types.toml` gives each kind for ever.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Kind(pub(super) u8);
 
-/// What is true of a kind. See `data/household/types.toml`.
+/// What is true of a kind. See `data/types.toml`.
 #[derive(Debug)]
 pub(super) struct KindFacts {
     pub symbol: Symbol,
@@ -125,11 +125,11 @@ struct TaskEntry {
 impl Facts {
     fn read() -> Facts {
         let types: BTreeMap<String, TypeEntry> =
-            embedded("types.toml", include_str!("../../../data/household/types.toml"));
+            embedded("types.toml", include_str!("../data/types.toml"));
         let rooms: BTreeMap<String, RoomEntry> =
-            embedded("rooms.toml", include_str!("../../../data/household/rooms.toml"));
+            embedded("rooms.toml", include_str!("../data/rooms.toml"));
         let mut tasks: BTreeMap<String, BTreeMap<String, TaskEntry>> =
-            embedded("tasks.toml", include_str!("../../../data/household/tasks.toml"));
+            embedded("tasks.toml", include_str!("../data/tasks.toml"));
 
         let mut ordered: Vec<(&String, &TypeEntry)> = types.iter().collect();
         ordered.sort_by_key(|(_, entry)| entry.number);
@@ -209,7 +209,7 @@ impl Facts {
 
 /// - panics: when an embedded table is broken; the tests read all of them.
 pub(super) fn embedded<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> T {
-    toml::from_str(text).unwrap_or_else(|error| panic!("data/household/{name}: {error}"))
+    toml::from_str(text).unwrap_or_else(|error| panic!("crates/household/data/{name}: {error}"))
 }
 
 impl Kind {

@@ -8,9 +8,9 @@ use super::{Household, mention};
 use crate::language::Utterance;
 use crate::world::{Domain, Edition, Lexicon};
 
-const OVERLAY: &str = include_str!("../../../../data/household/names-2.toml");
-const FIRST: &str = include_str!("../../../../data/household/names.toml");
-const WORDS: &str = include_str!("../../../../data/household/words-2.toml");
+const OVERLAY: &str = include_str!("../../data/names-2.toml");
+const FIRST: &str = include_str!("../../data/names.toml");
+const WORDS: &str = include_str!("../../data/words-2.toml");
 
 type Table = BTreeMap<String, BTreeMap<String, u32>>;
 

@@ -1,9 +1,8 @@
-//! Where programs act: the [`Domain`] trait, and one folder per domain. Nothing outside this room
+//! Where programs act: the [`Domain`] trait, and one crate per world. Nothing outside this room
 //! knows about mugs.
 
 mod domain;
 mod edition;
-pub mod household;
 mod lexicon;
 mod pointing;
 

@@ -1,8 +1,10 @@
 //! A household: four kinds of rooms, a hundred kinds of things, and a robot with one hand.
 //!
-//! Everything that is true of a household stands in `data/household/` as readable tables, embedded
+//! Everything that is true of a household stands in `data/` as readable tables, embedded
 //! in the binary; this room turns them into a world. Washing, heating and cooling are no commands:
 //! they follow from where a thing is when a faucet runs, a microwave runs or a fridge is closed.
+
+use apprentice_core::{ids, language, limits, world};
 
 mod bound;
 mod builder;

@@ -61,7 +61,7 @@ fn a_matching_scene_has_what_the_program_needs_and_ten_other_things_with_other_n
 /// Recorded plans run in scenes made for them. Needs the recorded data beside the project.
 #[test]
 fn recorded_plans_run_in_matching_scenes() {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let household = Household::new();
     for name in ["alfred_goals.jsonl.gz", "alfred_utterances.jsonl.gz"] {
         let Ok(file) = std::fs::File::open(shared.join(name)) else {

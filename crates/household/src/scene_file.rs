@@ -1,4 +1,4 @@
-//! Reads a scene that a person wrote. TOML; an example is `data/household/example_scene.toml`.
+//! Reads a scene that a person wrote. TOML; an example is `data/example_scene.toml`.
 //!
 //! ```toml
 //! room = "kitchen"            # kitchen, living_room, bedroom or bathroom

@@ -1,0 +1,13 @@
+//! The words that all of apprentice speaks: ids and limits, utterances, programs and answers,
+//! arithmetic with one order of summation, and what a world must offer. Pure: no clock, no entropy,
+//! no file, no thread.
+
+pub mod fairness;
+pub mod ids;
+pub mod invariants;
+pub mod language;
+pub mod limits;
+pub mod numerics;
+pub mod plain;
+pub mod sabotage;
+pub mod world;
