@@ -55,7 +55,7 @@ fn reply(first: u64, told: Vec<Told>) -> Response {
 
 fn requests() -> Vec<(&'static str, Ask)> {
     let task = "clean Mug CounterTop".to_owned();
-    let command = Ask::Command;
+    let command = |command: Command| Ask::from(command);
     let teach = |actions, on_clash| command(Command::Teach { explains: seq(3), actions, on_clash });
     let start = |stage| command(Command::StartEpisode { stage });
     vec![

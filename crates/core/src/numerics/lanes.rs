@@ -44,9 +44,11 @@ impl Kernel {
         FORCED.store(kernel.map_or(0, |kernel| kernel as u8), Ordering::Relaxed);
     }
 
-    /// Runs `task` with this kernel. One test at a time, so that each runs what it says.
-    #[cfg(test)]
-    pub(crate) fn run<T>(self, task: impl FnOnce() -> T) -> T {
+    /// Runs `task` with this kernel, for tests and measurements. One caller of the process at a time,
+    /// so that each runs what it says.
+    ///
+    /// - panics: as [`Kernel::force`].
+    pub fn run<T>(self, task: impl FnOnce() -> T) -> T {
         static ONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
         let _guard = ONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         Kernel::force(Some(self));
