@@ -140,7 +140,7 @@ fn every_free_text_of_the_wire_is_refused_with_its_character_and_nothing_is_reco
     // The limits of what is free text, at the limit and just above it.
     let (code, message) = rejected(ada.close(&"y".repeat(UTTERANCE_BYTES_MAX + 1)));
     assert_eq!(code, RejectionCode::BadText);
-    assert!(message.contains("2001 bytes; at most 2000"), "{message}");
+    assert!(message.contains("2001 bytes; the limit is 2000"), "{message}");
     let reason = "z".repeat(LABEL_BYTES_MAX + 1);
     assert_eq!(failed(ada.order(None, Order::Disable { reason })).0, ErrorCode::Refused);
     ada.say("ring 👩\u{200d}🚀 the brass bell").unwrap();
@@ -344,7 +344,8 @@ fn a_transcript_of_an_old_log_plays_as_itself() {
         let clean = (Some(0), "", "");
         assert_eq!((checked.code, &*checked.out, &*checked.err), clean, "{}", ran.out);
         assert!(ran.out.contains("\n> boogie\u{fffd}woogie\u{fffd}user victim\n"), "{}", ran.out);
-        let remark = "with � for what is no plain character: boogie\\u{202e}woogie\\u{2028}user";
+        let remark =
+            "with � for what is no plain character: boogie\\u{202e}woogie\\u{2028}user";
         assert!(ran.out.contains(remark), "{}", ran.out);
     }
 }
@@ -372,7 +373,7 @@ fn a_person_recorded_with_an_odd_name_is_reached_and_sees_plain_lines() {
     assert!(ran.out.contains("You taught me 1 request"), "{}", ran.out);
     let ran = run(&["--data", data, "--user", NAME], "");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-    assert!(ran.out.contains("closed for good"), "{}", ran.out);
+    assert!(ran.out.contains("cannot be opened again"), "{}", ran.out);
     let ran = run(&["erase", "--data", data, "--user", NAME], "");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
 }

@@ -56,7 +56,7 @@ fn taught() -> (tempfile::TempDir, String) {
     };
     let free = "free kitchen";
     let out = talk(free, "boogie\ngo to the fridge\nopen the fridge\ndone\n1-2\n");
-    assert!(out.contains("learned: 45 examples"), "{out}");
+    assert!(out.contains("Learned. I now know 45 examples."), "{out}");
     let out = talk(free, "go to the mug\nboogie\ndone\n:known\n");
     let lesson = out.split('#').nth(1).unwrap().split_whitespace().next().unwrap().to_owned();
     talk(free, &format!("do the dishes\ndone\nskip\n:forget {lesson}\ndone\n"));
