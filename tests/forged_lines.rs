@@ -412,7 +412,7 @@ fn a_revealed_record_adds_no_line_to_what_both_readers_of_a_proof_say() {
     honest("verify.py", &out, &[]);
     let (code, out, err) = second(&forged_key(&fs::read_to_string(&key).unwrap()));
     assert_eq!((code, out.as_str()), (Some(1), ""), "{err}");
-    assert!(err.contains("no signature of x\\u{1b}[8m\\u{a}"), "{err}");
+    assert!(err.contains("no signature by x\\u{1b}[8m\\u{a}"), "{err}");
     honest("verify.py", &err, &[]);
 }
 
