@@ -506,7 +506,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     let admit = ["tenant", "admit", "lab-a", &lab_pub, "--role", "gateway", label[0], label[1]];
     let closed = [&admit[..], &["--data", &data]].concat();
     assert_eq!(said(&closed), "tenant lab-a: done\n");
-    assert_eq!(said(&closed), "tenant lab-a: it was so already\n");
+    assert_eq!(said(&closed), "tenant lab-a: nothing changed; this was already done\n");
     let listed = said(&["tenant", "list", "lab-a", "--data", &data]);
     let printed = fs::read_to_string(&lab_pub).unwrap();
     assert!(listed.contains(printed.trim()) && listed.contains("room 7"), "{listed}");
@@ -524,7 +524,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     let as_host = ["--connect", &endpoint, "--key", &host, "--server-key", server.trim()];
     assert_eq!(
         said(&[&admit[..], &as_host].concat()),
-        "tenant lab-a: it was so already\n"
+        "tenant lab-a: nothing changed; this was already done\n"
     );
     assert_eq!(said(&[&["tenant", "list", "lab-a"][..], &as_host].concat()), listed);
     let ada =

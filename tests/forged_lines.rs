@@ -345,7 +345,7 @@ fn a_transcript_of_an_old_log_plays_as_itself() {
         assert_eq!((checked.code, &*checked.out, &*checked.err), clean, "{}", ran.out);
         assert!(ran.out.contains("\n> boogie\u{fffd}woogie\u{fffd}user victim\n"), "{}", ran.out);
         let remark =
-            "with � for what is no plain character: boogie\\u{202e}woogie\\u{2028}user";
+            "with � in place of each special character: boogie\\u{202e}woogie\\u{2028}user";
         assert!(ran.out.contains(remark), "{}", ran.out);
     }
 }
@@ -357,7 +357,7 @@ fn a_transcript_with_a_hidden_character_is_refused_with_its_place() {
     fs::write(&file, "task free kitchen\nepisode\n> go\u{202e}to\n").unwrap();
     let ran = run(&["transcript", "check", &file.display().to_string()], "");
     assert_eq!(ran.code, Some(2));
-    assert!(ran.err.contains("line 3, column 5: U+202E is no plain character"), "{}", ran.err);
+    assert!(ran.err.contains("line 3, column 5: U+202E is not a plain character"), "{}", ran.err);
     honest("transcript check", &ran.err, &[]);
 }
 

@@ -408,7 +408,7 @@ fn transcripts_are_checked_with_a_diff_and_a_code() {
     run(["transcript", "check", &broken], "").refused(&["broken.txt: line 4, column 3"]);
     run(["transcript", "run", "none-such.txt"], "").refused(&["none-such.txt"]);
     let early = file("early.txt", "task free\nepisode\nteach \"x\" := nothing\n");
-    run(["transcript", "check", &early], "").refused(&["line 3: nobody said \"x\""]);
+    run(["transcript", "check", &early], "").refused(&["line 3: \"x\" was not said"]);
 }
 
 #[test]
