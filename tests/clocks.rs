@@ -229,7 +229,7 @@ fn said(arguments: &[&str], data: &Path) -> String {
 
 #[test]
 fn the_log_shows_which_times_were_held() {
-    const HELD: &str = "time held: the clock read no later than the record before";
+    const HELD: &str = "time held: the clock did not move forward";
     let mut house = House::new(TODAY);
     let ada = house.service().connect(user("ada")).unwrap();
     ada.start(Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }).unwrap();

@@ -227,10 +227,10 @@ fn what_cannot_be_measured_is_refused_with_its_place() {
         ("> take mug 3\n~~ PICKUP Mug on Mug 3\n", "line 5: PICKUP Mug on Mug 3 cannot be"),
         ("> go to the mug\n", "line 4: no ~~ line below says what this utterance meant"),
         ("> hi\n~~ nothing\n~~ GOTO Mug\n", "line 6: an utterance that meant nothing"),
-        ("> hi\n~~ PICKUP Mug on Cup 2\n", "line 5, column 4: PICKUP Mug names no thing"),
-        ("done\n> hi\n~~ nothing\n", "line 5: no episode runs here"),
+        ("> hi\n~~ PICKUP Mug on Cup 2\n", "line 5, column 4: PICKUP Mug has no thing"),
+        ("done\n> hi\n~~ nothing\n", "line 5: there is no episode here"),
         ("> hi\n~~ nothing\ndone\nteach \"hi\" := actions 1..2\n", "line 7: 0 actions were meant"),
-        ("done\nteach \"hi\" := actions 1\n", "line 5: nobody said \"hi\""),
+        ("done\nteach \"hi\" := actions 1\n", "line 5: \"hi\" was not said"),
         ("done\nforget \"hi\"\n", "line 5: there is no lesson for \"hi\""),
     ];
     for (rest, reason) in cases {

@@ -495,7 +495,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
         assert_eq!(printed, fs::read_to_string(format!("{file}.pub")).unwrap());
     }
     let (code, text) = complained(&["keys", "new", "--out", &lab]);
-    assert!(code == 2 && text.contains("is there already"), "{text}");
+    assert!(code == 2 && text.contains("already exists"), "{text}");
     let public = |file: &str| format!("{file}.pub");
 
     // Closed: the first tenant makes the directory.
@@ -506,7 +506,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     let admit = ["tenant", "admit", "lab-a", &lab_pub, "--role", "gateway", label[0], label[1]];
     let closed = [&admit[..], &["--data", &data]].concat();
     assert_eq!(said(&closed), "tenant lab-a: done\n");
-    assert_eq!(said(&closed), "tenant lab-a: it was so already\n");
+    assert_eq!(said(&closed), "tenant lab-a: nothing changed; this was already done\n");
     let listed = said(&["tenant", "list", "lab-a", "--data", &data]);
     let printed = fs::read_to_string(&lab_pub).unwrap();
     assert!(listed.contains(printed.trim()) && listed.contains("room 7"), "{listed}");
@@ -522,7 +522,10 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     let (code, text) = complained(&closed.iter().map(|word| &**word).collect::<Vec<&str>>());
     assert!(code == 2 && text.contains("--connect"), "{text}");
     let as_host = ["--connect", &endpoint, "--key", &host, "--server-key", server.trim()];
-    assert_eq!(said(&[&admit[..], &as_host].concat()), "tenant lab-a: it was so already\n");
+    assert_eq!(
+        said(&[&admit[..], &as_host].concat()),
+        "tenant lab-a: nothing changed; this was already done\n"
+    );
     assert_eq!(said(&[&["tenant", "list", "lab-a"][..], &as_host].concat()), listed);
     let ada =
         connect(&service, &CurveKey::read(folder.path().join("lab").as_path()).unwrap(), "ada");
@@ -585,5 +588,5 @@ fn a_service_that_cannot_answer_handshakes_ends_and_answers_nobody() {
     let ended = child.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let said = String::from_utf8(ended.stderr).unwrap();
-    assert!(said.contains("the thread that answers handshakes ended"), "{said}");
+    assert!(said.contains("the thread that authenticates new connections ended"), "{said}");
 }

@@ -232,7 +232,7 @@ fn with_the_secret_in_the_environment_the_directory_alone_opens_nothing() {
         assert!(!refused.status.success() && refused.stdout.is_empty(), "{wrong:?}");
         let what = match wrong {
             None => "has no key file",
-            Some(_) => "APPRENTICE_TENANT_KEY_LOCAL opens the key of nobody",
+            Some(_) => "APPRENTICE_TENANT_KEY_LOCAL opens no user's key",
         };
         assert!(said(&refused).contains(what), "{}", said(&refused));
     }

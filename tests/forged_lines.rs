@@ -140,7 +140,7 @@ fn every_free_text_of_the_wire_is_refused_with_its_character_and_nothing_is_reco
     // The limits of what is free text, at the limit and just above it.
     let (code, message) = rejected(ada.close(&"y".repeat(UTTERANCE_BYTES_MAX + 1)));
     assert_eq!(code, RejectionCode::BadText);
-    assert!(message.contains("2001 bytes; at most 2000"), "{message}");
+    assert!(message.contains("2001 bytes; the limit is 2000"), "{message}");
     let reason = "z".repeat(LABEL_BYTES_MAX + 1);
     assert_eq!(failed(ada.order(None, Order::Disable { reason })).0, ErrorCode::Refused);
     ada.say("ring 👩\u{200d}🚀 the brass bell").unwrap();
@@ -344,7 +344,8 @@ fn a_transcript_of_an_old_log_plays_as_itself() {
         let clean = (Some(0), "", "");
         assert_eq!((checked.code, &*checked.out, &*checked.err), clean, "{}", ran.out);
         assert!(ran.out.contains("\n> boogie\u{fffd}woogie\u{fffd}user victim\n"), "{}", ran.out);
-        let remark = "with � for what is no plain character: boogie\\u{202e}woogie\\u{2028}user";
+        let remark =
+            "with � in place of each special character: boogie\\u{202e}woogie\\u{2028}user";
         assert!(ran.out.contains(remark), "{}", ran.out);
     }
 }
@@ -356,7 +357,7 @@ fn a_transcript_with_a_hidden_character_is_refused_with_its_place() {
     fs::write(&file, "task free kitchen\nepisode\n> go\u{202e}to\n").unwrap();
     let ran = run(&["transcript", "check", &file.display().to_string()], "");
     assert_eq!(ran.code, Some(2));
-    assert!(ran.err.contains("line 3, column 5: U+202E is no plain character"), "{}", ran.err);
+    assert!(ran.err.contains("line 3, column 5: U+202E is not a plain character"), "{}", ran.err);
     honest("transcript check", &ran.err, &[]);
 }
 
@@ -372,7 +373,7 @@ fn a_person_recorded_with_an_odd_name_is_reached_and_sees_plain_lines() {
     assert!(ran.out.contains("You taught me 1 request"), "{}", ran.out);
     let ran = run(&["--data", data, "--user", NAME], "");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-    assert!(ran.out.contains("closed for good"), "{}", ran.out);
+    assert!(ran.out.contains("cannot be opened again"), "{}", ran.out);
     let ran = run(&["erase", "--data", data, "--user", NAME], "");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
 }
@@ -411,7 +412,7 @@ fn a_revealed_record_adds_no_line_to_what_both_readers_of_a_proof_say() {
     honest("verify.py", &out, &[]);
     let (code, out, err) = second(&forged_key(&fs::read_to_string(&key).unwrap()));
     assert_eq!((code, out.as_str()), (Some(1), ""), "{err}");
-    assert!(err.contains("no signature of x\\u{1b}[8m\\u{a}"), "{err}");
+    assert!(err.contains("no signature by x\\u{1b}[8m\\u{a}"), "{err}");
     honest("verify.py", &err, &[]);
 }
 

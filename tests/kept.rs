@@ -70,7 +70,11 @@ fn an_audit_of_it_that_decides_and_trains_again_finds_no_differences() {
     assert_eq!(audit.code, Some(0), "{}{}", audit.out, audit.err);
     assert!(audit.out.ends_with("no differences\n"), "{}", audit.out);
     assert!(audit.out.contains("audited 21 streams: 604 records"), "{}", audit.out);
-    assert!(audit.out.contains("258 utterances of them; 0 otherwise today"), "{}", audit.out);
-    assert!(audit.out.contains("0 with another digest"), "{}", audit.out);
-    assert!(audit.out.contains("1 stream only the chain was checked"), "{}", audit.out);
+    assert!(audit.out.contains("(258 of them utterances): 0 differ;"), "{}", audit.out);
+    assert!(audit.out.contains("s: 0 differ\n"), "{}", audit.out);
+    assert!(
+        audit.out.contains("1 stream of erased users: only the chain was checked"),
+        "{}",
+        audit.out
+    );
 }

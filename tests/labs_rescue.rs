@@ -314,7 +314,7 @@ fn the_command_says_of_every_lab_what_was_kept_and_lost() {
     fs::remove_file(dir.path().join(own)).unwrap();
     let run = salvage();
     let said = String::from_utf8(run.stdout).unwrap();
-    let mug = mug.replace("lost nothing", "lost something of 1 streams, 0 records at least");
+    let mug = mug.replace("lost nothing", "lost something in 1 stream (at least 0 records)");
     assert!(said.contains(&mug) && said.contains(&fridge), "{said}");
     assert!(said.contains("lost: stream mug-lab/"), "{said}");
     assert_eq!(run.status.code(), Some(1), "{said}");

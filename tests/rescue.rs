@@ -279,7 +279,7 @@ fn an_export_shows_no_word_and_is_readable_by_its_owner_only() {
     };
     let run = export(&opened);
     assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
-    assert!(stderr(&run).contains("1 people were erased"), "{}", stderr(&run));
+    assert!(stderr(&run).contains("left out because erased: 1 user"), "{}", stderr(&run));
     let lines = fs::read_to_string(&opened).unwrap();
     let streams = open(&dir).unwrap();
     let mut expected = 0;

@@ -351,7 +351,7 @@ fn a_study_that_makes_no_sense_is_refused_in_a_sentence() {
         assert!(!out.exists(), "{arguments:?} left something behind");
     };
     check(&["--conditions", "papper"], &["papper", "default-1, default-2, paper, grammar"]);
-    check(&["--conditions", "paper,paper"], &["paper is named twice"]);
+    check(&["--conditions", "paper,paper"], &["paper twice"]);
     check(&["--task-types", "cool,bake"], &["\"bake\"", "look, place, nested, two, clean"]);
     check(&["--teacher", "no/such/file"], &["no/such/file cannot be used"]);
     check(&["--corpus", "no/such/file"], &["no/such/file cannot be read"]);
@@ -429,7 +429,7 @@ fn recorded_people_say_their_own_sentences_and_teach_them() {
     let bad = [
         ("\"user\":\"ada\"", "\"user\":\"\"", "its user is empty"),
         ("PICKUP Mug", "PICKUP Unicorn", "Unicorn"),
-        ("PICKUP Mug", "FRY Mug", "FRY is no action"),
+        ("PICKUP Mug", "FRY Mug", "FRY is not an action"),
         ("PICKUP Mug", "PUT Mug", "PUT takes 2 things"),
     ];
     lines.extend(bad.map(|(from, to, _)| torn.replace(from, to)));

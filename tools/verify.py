@@ -115,20 +115,20 @@ def public_key(text):
     name, digits, key = (text.split("+", 2) + ["", ""])[:3]
     data = unbase64(key, 33)
     tag = hashlib.sha256(name.encode() + b"\n" + data).digest()[:4]
-    need(name and data[0] == 1 and digits == tag.hex(), "it is no public key", Unreadable)
+    need(name and data[0] == 1 and digits == tag.hex(), "it is not a public key", Unreadable)
     return name, tag, Ed25519PublicKey.from_public_bytes(data[1:])
 
 def checkpoint(note, key):
     """Size and root, once the key's signature was checked."""
     name, tag, public = key
-    need("\n\n" in note and note.endswith("\n"), "it is no signed note")
+    need("\n\n" in note and note.endswith("\n"), "it is not a signed note")
     need(not re.search("[\0-\t\v-\x1f\x7f]", note), "it holds control characters")
     text, signatures = note.rsplit("\n\n", 1)
     text, signatures, found = text + "\n", signatures[:-1].split("\n"), False
     need(len(signatures) <= 64, "too many signatures")
     for line in signatures:
         match = re.fullmatch("\u2014 ([!-*,-~]{1,255}) ([A-Za-z0-9+/=]+)", line)
-        need(match, "a line is no signature")
+        need(match, "a line is not a signature")
         signature = unbase64(match[2], kind=Refused)
         need(len(signature) > 4, "a signature is too short")
         if match[1] == name and signature[:4] == tag:
@@ -136,17 +136,17 @@ def checkpoint(note, key):
                 public.verify(signature[4:], text.encode())
                 found = True
             except InvalidSignature:
-                raise Refused("the signature does not fit the note") from None
-    need(found, "the note carries no signature of " + name)
+                raise Refused("the signature does not match the note") from None
+    need(found, "the note has no signature by " + name)
     lines = text[:-1].split("\n")
-    need(len(lines) >= 3 and all(lines), "it is no checkpoint")
+    need(len(lines) >= 3 and all(lines), "it is not a checkpoint")
     need(lines[0] == name, "it is a checkpoint of another log")
     return number(lines[1], Refused), unbase64(lines[2], 32, Refused)
 
 # --- the proof ---------------------------------------------------------------------------------
 def read_proof(text):
     """What the lines say, by name, and the checkpoint."""
-    need(text.startswith("apprentice proof 1\n") and "\n\n" in text, "it is no proof", Unreadable)
+    need(text.startswith("apprentice proof 1\n") and "\n\n" in text, "it is not a proof", Unreadable)
     head, note = text.split("\n\n", 1)
     order = ["record", "revealed", "segment", "segment-path", "leaf", "tree-path", "since"]
     found = {}
@@ -176,7 +176,7 @@ def read_proof(text):
 
 def check_record(found, size, root):
     frame, (stream, first, last, head) = found["record"], found["segment"]
-    need(len(frame) >= 128 and frame[:4] == b"APR1", "it is no record")
+    need(len(frame) >= 128 and frame[:4] == b"APR1", "it is not a record")
     length, checksum = struct.unpack(">II", frame[120:128])
     need(length == len(frame) - 128 and checksum == zlib.crc32(frame[128:], zlib.crc32(frame[:124])),
          "the record is not as it was written")
@@ -188,7 +188,7 @@ def check_record(found, size, root):
     data = b"APS1" + stream + struct.pack(">QQ", first, last) + inner[1] + head
     outer = found["leaf"] < size and climb(found["leaf"], size - 1, found["tree-path"], b"", leaf(data))
     need(outer, "the path in the tree does not fit")
-    need(outer[1] == root, "the record is not the one that the log held")
+    need(outer[1] == root, "this is not the record that was in the log")
     need("revealed" not in found or blake3(found["revealed"]) == frame[84:116], "salt and body are not the record's")
     return "record %d of stream %s (digest %s)" % (seq, stream.hex(), digest.hex())
 
@@ -197,7 +197,7 @@ def check(data, key_text, since):
     try:
         found, note = read_proof(data.decode())
     except UnicodeDecodeError:
-        raise Unreadable("it is no text") from None
+        raise Unreadable("it is not text") from None
     size, root = checkpoint(note, key)
     shown = [check_record(found, size, root)] if "record" in found else []
     if since is not None:

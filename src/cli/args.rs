@@ -12,11 +12,11 @@ use crate::store;
 
 const AFTER_HELP: &str = "\
 Examples:
-  apprentice                                   talk to the robot; everything is kept
+  apprentice                                   talk to the robot; everything is saved
   apprentice --seed 7 --task 'clean Mug CounterTop'
                                                the same task and scene each time
   printf 'go to the mug\\n' | apprentice --data demo
-                                               the goal and each answer, one line each
+                                               read sentences from a pipe; one line per answer
   apprentice serve --data lab --zmq tcp://127.0.0.1:7117
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada
   apprentice transcript check tests/transcripts/*.txt
@@ -30,15 +30,15 @@ Examples:
   apprentice verify ada-17.proof --key lab.pub
 
 Exit codes:
-  0  fine; the end of input is fine too
-  1  differences were found, or it was tried and went wrong
-  2  bad usage, or a file or directory that cannot be used";
+  0  success
+  1  the command failed, or it found differences
+  2  the arguments are wrong, or a file or directory cannot be used";
 
-/// A household robot that you talk to in your own words, and teach.
+/// A household robot that you control in your own words, and that you teach.
 ///
-/// Without a command: a service of your own and a conversation with it in this terminal. What the
-/// robot does not understand, do with simple requests; after the task, say which of those actions
-/// your words stood for. With standard input not a terminal, lines are read from it.
+/// Without a command, apprentice starts a conversation in this terminal. If the robot does not
+/// understand you, do the task in small steps. After the task, say which of those steps your words
+/// meant. If standard input is a file or a pipe, apprentice reads one sentence per line from it.
 #[derive(Debug, Parser)]
 #[command(name = "apprentice", version, after_help = AFTER_HELP, args_conflicts_with_subcommands = true)]
 struct CommandLine {
@@ -91,7 +91,7 @@ fn run(arguments: CommandLine) -> Result<(), Failure> {
     if let Ok(program) = std::env::current_exe() {
         store::check_with(program);
     }
-    // Who serves others wants to see that it runs; who talks wants to see the conversation.
+    // An operator wants to see that the service runs. A person who talks wants only the conversation.
     let filter = match arguments.command {
         Some(Verb::Serve(_)) => "info",
         _ => "warn",

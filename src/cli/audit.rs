@@ -12,10 +12,11 @@ use crate::ids::{StreamKey, TenantId};
 use crate::replay::{self, AuditReport, Counts, Scrutiny, StreamReport};
 use crate::world::household::Household;
 
-/// Hold everything recorded against what this program computes.
+/// Check every record against what this program computes.
 ///
-/// Every record is read, its checksum, number, chain and seal are checked, and it is folded into
-/// its person's session, scene digests included. The directory is copied first and stays as it is.
+/// Reads every record, checks its checksum, number, chain and seal, and applies it to the user's
+/// session, with the digests of the scenes. The audit works on a copy and does not change the
+/// directory.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -23,27 +24,27 @@ Examples:
   apprentice audit --data lab --repropose --retrain
   apprentice audit --data lab --tenant local --json | jq .counts
 
-Counts are on standard output, progress on standard error. docs/replay.md says what each digest
-covers and what an audit can not see.
+The results go to standard output and the progress bar to standard error. docs/replay.md says what
+each digest covers and what an audit cannot see.
 
-Exit codes: 0 no differences; 1 differences, the first of each stream named; 2 the directory cannot
-be used or has no such tenant.")]
+Exit codes: 0 no differences; 1 there are differences (the first one of each stream is shown); 2 the
+directory cannot be used or has no such tenant.")]
 pub struct Arguments {
-    /// The data directory; it is copied first, and the copy is read
+    /// The data directory. The command works on a copy of it
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Only this lab's people.
+    /// Audit only this lab.
     #[arg(long, value_name = "NAME")]
     tenant: Option<String>,
-    /// Interpret every recorded utterance again, with the mind of its moment, and decide every
-    /// lesson again; compare what would be recorded today with what was.
+    /// Decide every recorded command again, each with the mind of its time, and compare the result
+    /// with the record.
     #[arg(long)]
     repropose: bool,
-    /// Train every recorded mind again and compare digests.
+    /// Train every recorded mind again and compare its digest with the record.
     #[arg(long)]
     retrain: bool,
-    /// One JSON object, without times.
+    /// Print one JSON object, without times.
     #[arg(long)]
     json: bool,
 }
@@ -83,7 +84,7 @@ fn readable(report: &AuditReport, scrutiny: Scrutiny) -> String {
 fn stream_lines(stream: &StreamReport) -> Vec<String> {
     let who = match (&stream.user, stream.erased) {
         (Some(user), _) => user.to_string(),
-        _ if stream.stream == StreamKey::TENANT => "the tenant's own".to_owned(),
+        _ if stream.stream == StreamKey::TENANT => "the tenant's own stream".to_owned(),
         (None, true) => "erased".to_owned(),
         (None, false) => "unknown".to_owned(),
     };
@@ -108,31 +109,36 @@ fn count_lines(counts: &Counts, scrutiny: Scrutiny) -> Vec<String> {
     )];
     if counts.held_times > 0 {
         lines.push(format!(
-            "{} with a held time: the clock read no later than the record before",
+            "{} with a held time: the clock did not move forward",
             n(counts.held_times, "record")
         ));
     }
     if counts.segments > 0 {
-        lines.push(format!("held {} against their records", n(counts.segments, "segment")));
+        lines.push(format!("checked {} against their records", n(counts.segments, "segment")));
     }
     if counts.erased_streams > 0 {
         lines.push(format!(
-            "of {} only the chain was checked: the people behind them were erased",
+            "{} of erased users: only the chain was checked",
             n(counts.erased_streams, "stream")
         ));
     }
     if scrutiny.repropose {
+        let known = match (counts.proposals_differ, counts.streams_differ) {
+            (1.., 0) => " (an older version recorded the same meaning in another form)",
+            _ => "",
+        };
         lines.push(format!(
-            "decided again: {}, {} of them; {} otherwise today; {} missing and trained for it",
+            "re-decided {} ({} of them utterances): {} differ{known}; minds retrained because \
+             missing: {}",
             n(counts.reproposed, "command"),
-            n(counts.reproposed_utterances, "utterance"),
+            counts.reproposed_utterances,
             counts.proposals_differ,
-            n(counts.minds_missing, "mind"),
+            counts.minds_missing,
         ));
     }
     if scrutiny.retrain {
         lines.push(format!(
-            "trained again: {} of lessons, {}; {} with another digest",
+            "retrained {} with lessons and {}: {} differ",
             n(counts.retrained, "mind"),
             n(counts.retrained_base, "base mind"),
             counts.trainings_differ
@@ -140,7 +146,7 @@ fn count_lines(counts: &Counts, scrutiny: Scrutiny) -> Vec<String> {
     }
     lines.push(match counts.streams_differ {
         0 => "no differences".to_owned(),
-        differ => format!("{} with differences", n(differ, "stream")),
+        differ => format!("differences in {}", n(differ, "stream")),
     });
     lines
 }

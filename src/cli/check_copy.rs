@@ -37,13 +37,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     limit(Resource::As, arguments.memory)?;
     limit(Resource::Core, 0)?;
-    // Whoever opens the directory next makes another copy in this one's place: nobody may be left
-    // writing into it.
+    // The next process that opens the directory replaces this copy, so no process may still write
+    // into it.
     set_parent_process_death_signal(Some(Signal::KILL)).map_err(|error| {
-        Failure::failed(format!("this process cannot be bound to the one that asked: {error}"))
+        Failure::failed(format!("this process cannot be tied to its parent: {error}"))
     })?;
     if getppid().map(|parent| parent.as_raw_nonzero().get()) != Some(arguments.parent) {
-        return Err(Failure::failed("the process that asked is gone"));
+        return Err(Failure::failed("the process that started this check has ended"));
     }
     let part = match arguments.part {
         Part::Log => "log",

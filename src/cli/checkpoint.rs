@@ -12,42 +12,44 @@ use crate::ids::TenantId;
 use crate::replay::{self, ORIGIN, Through, Wanted};
 use crate::store::{self, OpenError, Store};
 
-/// Sign what a lab's log holds now, so that nobody can rewrite it unnoticed.
+/// Sign the current contents of a lab's log, so that nobody can rewrite them unnoticed.
 ///
-/// Closes what no segment covers yet, signs the tree over all segments, and keeps the checkpoint in
-/// the directory. A checkpoint binds the operator only when somebody else keeps it too: hand it out.
+/// Closes the last segments, signs the tree over all segments, and stores the checkpoint in the
+/// directory. Give a copy to others: a checkpoint binds the operator only if somebody else keeps it.
+/// Run this only on the live directory. A copy would sign a conflicting history.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  apprentice checkpoint --data lab --origin lab.example.org    the first time: names the service
+  apprentice checkpoint --data lab --origin lab.example.org    the first time: name the service
   apprentice checkpoint --data lab --out may.checkpoint
   apprentice checkpoint --data lab --public-key > lab.pub      what verifiers need
   apprentice checkpoint --data lab --since may.checkpoint --out may-to-june.proof
 
-A service that runs signs by itself, at most once a minute and when it ends; checkpoints/TENANT in the
-data directory holds all that were ever signed. docs/evidence.md says what a checkpoint shows.
+A running service signs checkpoints itself, at most once a minute and when it stops. The file
+checkpoints/TENANT in the data directory contains all checkpoints. docs/evidence.md says what a
+checkpoint proves.
 
 Exit codes: 1 the log does not continue what was signed before; 2 the directory or a file cannot be
 used.")]
 pub struct Arguments {
-    /// The data directory, which nothing else may have open
+    /// The data directory. No other process may have it open
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// The lab.
     #[arg(long, value_name = "NAME", default_value = "local")]
     tenant: String,
-    /// Write to this file instead of to standard output.
+    /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// The name of the service in checkpoints and keys, such as its host. Given once, before the
-    /// first checkpoint; `apprentice` when it never was.
+    /// The name of the service in checkpoints and keys, for example its host. Give it once, before
+    /// the first checkpoint [default: apprentice]
     #[arg(long, value_name = "NAME")]
     origin: Option<String>,
-    /// Sign nothing, and print the public key instead.
+    /// Print the public key and sign nothing.
     #[arg(long, conflicts_with_all = ["since"])]
     public_key: bool,
-    /// Write a proof that the log only grew since this checkpoint, for `apprentice verify --since`.
+    /// Write a proof for `apprentice verify --since`: the log only grew since this checkpoint.
     #[arg(long, value_name = "OLD_CHECKPOINT")]
     since: Option<PathBuf>,
 }
@@ -89,10 +91,10 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     write(arguments.out.as_deref(), &text)
 }
 
-/// Names the service, unless something was signed under another name already.
+/// Names the service. Refuses if checkpoints with another name exist.
 fn name(store: &Store, tenant: &TenantId, origin: &str) -> Result<(), Failure> {
     if origin.is_empty() || origin.ends_with('/') {
-        return Err(Failure::bad_input("--origin is the name of a host or of a service"));
+        return Err(Failure::bad_input("--origin must be the name of a host or a service"));
     }
     // What else a name may be is for the key to say.
     NoteSigner::new(&format!("{origin}/{tenant}"), &[1; 32])
@@ -111,7 +113,7 @@ pub(super) fn older(path: &Path, key: &VerifierKey) -> Result<Checkpoint, Failur
         .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))
 }
 
-/// Opening makes a directory that is not there, which nobody means who asks for what it holds.
+/// Opening would make a missing directory, and then sign an empty log.
 fn check_there(directory: &Path) -> Result<(), Failure> {
     match directory.join("LAYOUT").exists() || directory.join("log").exists() {
         true => Ok(()),

@@ -8,23 +8,22 @@ use super::{data_dir, recipe, terminal};
 use crate::service::Data;
 use crate::store::HISTORY_FILE;
 
-/// A service of one's own and a conversation with it.
+/// Start a service inside this process and talk to it.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Where everything is kept [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    /// The data directory [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Who is talking: each person teaches a robot of their own.
+    /// Your name. Each user has their own robot and their own lessons.
     #[arg(long, value_name = "NAME", default_value = "you")]
     user: String,
-    /// Fixes scenes and tasks; the next episode has the next seed.
+    /// Fixes the scenes and the tasks. Each new task uses the next seed.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// What the first tasks are about, in order; give it again for the next one. Later tasks are
-    /// drawn.
+    /// The first task. Repeat the option to choose the tasks after it. Later tasks are random.
     #[arg(long, value_name = "'clean Mug CounterTop'")]
     task: Vec<String>,
-    /// The recipe that a new person starts with: default, default-1, default-2, paper, grammar, seq2seq,
+    /// The recipe for a new user: default, default-1, default-2, paper, grammar, seq2seq,
     /// seq2seq-grammar, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,

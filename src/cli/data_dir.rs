@@ -16,18 +16,18 @@ pub fn choose(flag: Option<PathBuf>) -> Result<PathBuf, Failure> {
         Some(directory) => Ok(directory),
         None => default(variable("XDG_DATA_HOME"), variable("HOME")).ok_or_else(|| {
             Failure::bad_input(
-                "there is no home directory to keep data in; name one with --data DIR",
+                "there is no home directory to keep data in; choose a directory with --data DIR",
             )
         }),
     }
 }
 
-/// For commands that change what is there and must not make a directory by a slip of the pen.
+/// For commands that change a directory and must not make a new one because of a typing error.
 pub fn must_hold_data(directory: &Path) -> Result<(), Failure> {
     match directory.join("LAYOUT").exists() {
         true => Ok(()),
         false => Err(Failure::bad_input(format!(
-            "there is no data directory of apprentice at {}; name the one that people's data is in",
+            "there is no data directory of apprentice at {}; name the right one with --data",
             directory.display()
         ))),
     }

@@ -7,16 +7,15 @@ use super::office::Place;
 use crate::events::PersonErased;
 use crate::ids::TenantId;
 
-/// Erase a person: destroy the key that everything of theirs is sealed with.
+/// Erase a user: destroy their key.
 ///
-/// Their records stay where they are and are noise from then on, so that every chain, every
-/// checkpoint and everybody else's proofs still verify; `audit` reports them as erased. Their minds
-/// and snapshots are dropped, and the tenant's stream says what was done, signed. The name may be
-/// used again: by somebody new, who was taught nothing.
+/// Their records, minds and snapshots can no longer be decrypted. The sealed records stay in the log,
+/// so every chain, every checkpoint and all other proofs still verify. `audit` reports the stream as
+/// erased. The tenant's own stream records the erasure, signed. A new user may use the name. The
+/// robot of this new user knows no lessons.
 ///
-/// What this cannot reach: backups and exports made before, which keep the key, and blocks that a
-/// copying file system or a flash disk keeps after they were overwritten. Destroy the backups, and
-/// encrypt the disk.
+/// Older backups and exports still contain the key: destroy them. Some file systems and flash disks
+/// keep overwritten blocks: encrypt the disk.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -25,17 +24,18 @@ Examples:
   apprentice erase --tenant robotics --user ada --connect tcp://robot.example:7117 \
       --key operator.key --server-key server.pub
 
-It can not be taken back, and asks nothing. Given again, it erases whoever bears the name by then, or says that
-nobody does; cut short, it is finished by the next command or service that opens the directory.
+You cannot undo this, and the command does not ask. If it is interrupted, the next command or service
+that opens the directory finishes it. If you repeat it, it erases the user who has the name by then, or
+it says that there is no such user.
 
-Exit codes: 0 erased, 1 it went wrong, 2 there is no such person, or no such directory.")]
+Exit codes: 0 erased; 1 it failed; 2 there is no such user or directory.")]
 pub struct Arguments {
     #[command(flatten)]
     place: Place,
-    /// The lab the person belongs to.
+    /// The lab of the user.
     #[arg(long, value_name = "NAME", default_value = "local")]
     tenant: String,
-    /// The person.
+    /// The user.
     #[arg(long, value_name = "NAME")]
     user: String,
     /// Print one JSON object.
@@ -63,8 +63,8 @@ pub fn say(tenant: &TenantId, erased: &PersonErased, as_json: bool) {
             })
         ),
         false => println!(
-            "erased: the {last} records of stream {tenant}/{stream} are noise from now on\n\
-             not reached: backups and exports made before; destroy them too"
+            "erased: the {last} records of stream {tenant}/{stream} can no longer be decrypted\n\
+             not erased: older backups and exports still contain the key; destroy them too"
         ),
     }
 }

@@ -26,7 +26,7 @@ const SEEDS: [u64; 3] = [1, 2, 3];
 /// Episodes and rows of one seed, at most: what a slip of the finger should not start.
 const LIMIT_MAX: u64 = 1_000_000;
 
-/// Measure how much of recorded human sentences is understood.
+/// Measure how many recorded human sentences the robot understands.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -39,61 +39,62 @@ Examples:
   apprentice eval --corpus utterances.jsonl.gz --ablation tools/additions.toml --recipe paper
   apprentice eval --protocol conversation data/conversations/look --cases 20
 
-docs/evaluation.md describes the corpus, the protocols and every figure.
+docs/evaluation.md describes the corpus, the protocols and every number.
 
-Exit codes: 0 the figures are on standard output; 1 a training failed; 2 the corpus, a transcript or
-the recipe cannot be used, or --strict met a bad line.")]
+Exit codes: 0 the results are on standard output; 1 a training failed; 2 the corpus, a transcript or
+the recipe cannot be used, or --strict found a bad line.")]
 pub struct Arguments {
-    /// For --protocol conversation: a directory of transcripts (*.txt) with their scenes beside them.
+    /// For --protocol conversation: a directory of transcripts (*.txt) and their scene files.
     #[arg(value_name = "DIR", conflicts_with_all = ["corpus", "ablation", "limit", "lessons",
         "teachers", "people", "staging", "failures", "strict"])]
     conversations: Option<PathBuf>,
-    /// Recorded sentences, one JSON object a line; plain or gzipped.
+    /// The recorded sentences, one JSON object per line. The file may be gzipped.
     #[arg(long, value_name = "FILE", required_unless_present = "conversations")]
     corpus: Option<PathBuf>,
-    /// What is measured.
+    /// What to measure.
     #[arg(long, value_enum, required_unless_present = "ablation")]
     protocol: Option<Protocol>,
-    /// Instead: take back, or add, one difference of the recipe at a time, as this file lists them,
-    /// and show what primitives and one-shot gain by it. --limit counts rows; episodes are 24 a seed.
+    /// Instead of a protocol: remove, or add, the listed settings of the recipe one at a time, and show
+    /// how primitives and one-shot change. --limit counts rows; there are 24 episodes per seed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["protocol", "failures", "cases", "lessons", "teachers"])]
     ablation: Option<PathBuf>,
-    /// The recipe that minds are trained with: default, default-1, default-2, paper, grammar, seq2seq, seq2seq-grammar, or
+    /// The recipe to train with: default, default-1, default-2, paper, grammar, seq2seq, seq2seq-grammar, or
     /// a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
-    /// Draws rows, scenes and the training seed; without it, seeds 1, 2 and 3 run. For
-    /// conversation: the training seed, instead of the recipe's own.
+    /// The random seed for rows, scenes and training [default: seeds 1, 2 and 3]. For conversation:
+    /// the training seed, instead of the recipe's own.
     #[arg(long)]
     seed: Option<u64>,
-    /// Rows of each seed, or episodes for one-shot and goals; all rows, or 24 episodes, without it.
+    /// Rows per seed, or episodes for one-shot and goals [default: all rows, or 24 episodes]
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=LIMIT_MAX))]
     limit: Option<u64>,
-    /// Sentences that an episode of one-shot or goals teaches.
+    /// Sentences to teach in each episode of one-shot or goals.
     #[arg(long, value_name = "COUNT", default_value_t = 1,
         value_parser = clap::value_parser!(u64).range(1..=50))]
     lessons: u64,
-    /// Whose sentences these are: all of one person, or each of another.
+    /// Whether one person said all the sentences of an episode, or several people.
     #[arg(long, value_name = "one|several", default_value = "one")]
     teachers: Teachers,
-    /// What scenes have: only what is meant needs (plain), or also what the words tell (held): the
-    /// thing in the hand that "take the mug to the sink" carries, and on what is turned off.
+    /// What is in the scenes. plain: only what the meaning needs. held: also what the words imply,
+    /// for example a mug in the hand for "take the mug to the sink", or a lamp that is on for "turn
+    /// off the lamp".
     #[arg(long, value_name = "plain|held", default_value = "plain")]
     staging: Staging,
-    /// Whose sentences: a fixed two thirds to choose settings on, the held-out rest, or all.
+    /// Which people: two thirds for choosing settings, the held-out rest, or all.
     #[arg(long, value_name = "choosing|held-out|all", default_value = "all")]
     people: People,
-    /// Also show so many failures of each kind (not with --json).
+    /// Also show this many failures of each kind (not with --json).
     #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
     failures: usize,
-    /// Also list so many failures of each verdict, drawn whatever the reason, as Markdown without
-    /// the recorded sentences; for conversation, the first lines of each class (not with --json).
+    /// Also list this many random failures of each verdict, as Markdown without the recorded
+    /// sentences. For conversation: the first lines of each class (not with --json).
     #[arg(long, value_name = "COUNT", default_value_t = 0, conflicts_with = "json")]
     cases: usize,
     /// Stop at the first bad line of the corpus.
     #[arg(long)]
     strict: bool,
-    /// Threads at work.
+    /// The number of threads.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=64))]
     threads: u64,
     /// Print one JSON object.
@@ -122,7 +123,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let Some(path) = arguments.corpus.as_deref().filter(|_| !arguments.asks_for_conversations())
     else {
         return Err(Failure::bad_input(
-            "--protocol conversation takes a directory of transcripts instead of a corpus",
+            "--protocol conversation needs a directory of transcripts, not a corpus",
         ));
     };
     let variants = arguments.ablation.as_deref().map(|path| variants(path, &text)).transpose()?;
@@ -160,7 +161,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 fn converse(arguments: &Arguments, recipe: &Recipe, directory: &Path) -> Result<(), Failure> {
     if !arguments.asks_for_conversations() {
         return Err(Failure::bad_input(
-            "a directory of transcripts is measured with --protocol conversation",
+            "use --protocol conversation with a directory of transcripts",
         ));
     }
     let bar = Bar::new("");
@@ -257,7 +258,9 @@ pub fn tell_bad_lines(bad: &[BadLine], strict: bool) -> Result<(), Failure> {
     }
     if bad.len() > BAD_LINES_SHOWN {
         let more = bad.len() - BAD_LINES_SHOWN;
-        eprintln!("apprentice: and {more} more bad lines; --strict stops at the first");
+        eprintln!(
+            "apprentice: {more} more lines are left out; --strict stops at the first bad line"
+        );
     }
     Ok(())
 }
@@ -276,7 +279,7 @@ fn check_rows(arguments: &Arguments, path: &Path, corpus: &Corpus) -> Result<(),
         return Ok(());
     }
     Err(Failure::bad_input(format!(
-        "the corpus {} has no {needed} of the people {}; of the other kind it has {other}",
+        "the corpus {} has no {needed} for --people {}; it has {other} sentences of the other kind",
         path.display(),
         arguments.people
     )))

@@ -7,35 +7,35 @@ use clap::Args;
 use serde_json::Value;
 
 use super::failure::Failure;
-use super::{data_dir, log, shown};
+use super::{data_dir, log, shown, terminal::count};
 use crate::ids::{Seq, TenantId};
 use crate::store;
 
-/// Write one tenant to a file, to be imported elsewhere or analysed.
+/// Write one tenant to a file, to import it elsewhere or to analyse it.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   apprentice export --data lab --out lab.apx
   apprentice export --data lab --out lab.ndjson --ndjson
 
-Two files are made. FILE holds everything sealed: without the other it shows how many people there are,
-how much they said and when, and no word. FILE.key is the tenant's secret, which opens all of it: move
-it by another way, and keep it as you keep passwords. With --ndjson there is one file, and everything
-that people said stands in it in the clear. All are readable by their owner only.
+This makes two files. FILE contains all sealed records. Without FILE.key it shows only how many users
+there are, how much they said and when. FILE.key is the tenant's secret and decrypts everything: send it
+another way, and keep it like a password. With --ndjson there is one file, which contains everything
+that users said, decrypted. Only you can read these files.
 
-Exit codes: 1 a record cannot be read, 2 the directory or the file cannot be used.")]
+Exit codes: 1 a record cannot be read; 2 the directory or the file cannot be used.")]
 pub struct Arguments {
-    /// The data directory; it is read and not changed
+    /// The data directory. It is not changed
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// The lab whose people are exported.
+    /// The lab to export.
     #[arg(long, value_name = "NAME", default_value = "local")]
     tenant: String,
-    /// The file to make; it must not exist.
+    /// The new file. It must not exist.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Write every record opened, one JSON object per line, instead.
+    /// Instead, write every record decrypted, one JSON object per line.
     #[arg(long)]
     ndjson: bool,
 }
@@ -55,7 +55,10 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         })?;
     println!("exported {} records of {} people", exported.records, exported.people);
     let key = store::key_file_of(&arguments.out);
-    eprintln!("apprentice: {} opens all of it: keep it apart and secret", key.display());
+    eprintln!(
+        "apprentice: {} decrypts all of it; keep it secret and in another place",
+        key.display()
+    );
     Ok(())
 }
 
@@ -102,7 +105,7 @@ fn ndjson(directory: &Path, tenant: &TenantId, out: &Path) -> Result<(), Failure
     written?;
     println!("exported {records} records of {} people", people - erased);
     if erased > 0 {
-        eprintln!("apprentice: {erased} people were erased and are not in it");
+        eprintln!("apprentice: left out because erased: {}", count(erased, "user"));
     }
     Ok(())
 }

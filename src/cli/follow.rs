@@ -16,7 +16,7 @@ use super::shown;
 use crate::frontends::{Followed, Follower, Position};
 use crate::ids::{Seq, StreamKey, WithinTenant};
 
-/// Follow what a lab's service records, and miss nothing: each record once, as soon as it is durable.
+/// Print each new record of a lab as soon as it is durable. No record is missed or repeated.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -24,28 +24,28 @@ Examples:
   apprentice follow --connect tcp://robot.example:7117 --key operator.key --server-key server.pub \\
       --plain --json --state positions.json >> records.ndjson
 
-The service must have been started with --feed. Each record is held against its digest and its
-predecessor's; with --state, against what was seen before, too. A record that was printed just before a
-kill may be printed again.
+The service must run with --feed. Each record is checked against its own digest and the digest of the
+record before it. With --state, it is also checked against the records of earlier runs. After a kill,
+the last record may be printed again.
 
-Exit codes: 0 interrupted, 1 no answer, not admitted (any more), or a log that was rewritten, 2 an argument
-that cannot be used.")]
+Exit codes: 0 interrupted; 1 no answer, the key is not admitted, or the log was rewritten; 2 an
+argument cannot be used.")]
 pub struct Arguments {
-    /// The service's door with keys.
+    /// The service's endpoint with keys.
     #[arg(long, value_name = "ENDPOINT")]
     connect: String,
     #[command(flatten)]
     passport: Passport,
-    /// Records in the clear; for operators.
+    /// Print decrypted records. This needs an operator key.
     #[arg(long)]
     plain: bool,
-    /// One JSON object per line; sealed records with all of their bytes.
+    /// Print one JSON object per line. Sealed records contain all their bytes.
     #[arg(long)]
     json: bool,
-    /// Go on where this file says, and keep it up to date.
+    /// Start after the position in this file, and update the file.
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
-    /// End when nothing came for so many seconds, instead of never.
+    /// Stop after this many seconds without a record.
     #[arg(long, value_name = "SECONDS")]
     until_quiet: Option<u64>,
 }
@@ -55,7 +55,7 @@ const LOOK: Duration = Duration::from_millis(200);
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     if !arguments.passport.is_given() {
-        return Err(Failure::bad_input("a feed lets in only those with a key: name it with --key"));
+        return Err(Failure::bad_input("a feed needs a key; name yours with --key"));
     }
     let positions = arguments.state.as_deref().map(read).transpose()?.unwrap_or_default();
     let client = arguments.passport.client(&arguments.connect, embedded::user("follower")?)?;
@@ -66,7 +66,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let stopped = Arc::new(AtomicBool::new(false));
     let stop = stopped.clone();
     ctrlc::set_handler(move || stop.store(true, Ordering::SeqCst))
-        .map_err(|error| Failure::failed(format!("signals cannot be heard: {error}")))?;
+        .map_err(|error| Failure::failed(format!("signals cannot be handled: {error}")))?;
     let (mut quiet, mut unkept) = (Duration::ZERO, false);
     while !stopped.load(Ordering::SeqCst) {
         match follower.next(if unkept { Duration::ZERO } else { LOOK }).map_err(Failure::failed)? {
@@ -135,7 +135,7 @@ fn show(followed: &Followed, as_json: bool) -> io::Result<()> {
 
 fn read(path: &Path) -> Result<WithinTenant<Position>, Failure> {
     let bad = |reason: String| {
-        Failure::bad_input(format!("{} holds no positions: {reason}", path.display()))
+        Failure::bad_input(format!("{} is not a file of positions: {reason}", path.display()))
     };
     let text = match fs::read_to_string(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(WithinTenant::new()),

@@ -6,20 +6,20 @@ use super::data_dir;
 use super::failure::Failure;
 use crate::store;
 
-/// Put an exported tenant into a data directory.
+/// Import an exported tenant into a data directory.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   apprentice import --data new-lab --in lab.apx
   apprentice import --data new-lab --in lab.apx --key /media/stick/lab.apx.key
 
-The whole file is proved first: it is imported whole or not at all. The directory may be new, or hold
-other tenants; it must not hold this one.
+The file is checked first. Then all of it is imported, or nothing. The directory may be new, or contain
+other tenants. It must not contain this tenant.
 
-Exit codes: 1 the export or its key is damaged (the frame is named), 2 a file or the directory cannot
-be used.")]
+Exit codes: 1 the export or its key is damaged (the message names the frame); 2 a file or the
+directory cannot be used.")]
 pub struct Arguments {
-    /// The data directory, made if it does not exist
+    /// The data directory. It is made if it does not exist
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,

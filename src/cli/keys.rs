@@ -7,7 +7,7 @@ use super::failure::Failure;
 use crate::frontends::{CurveKey, show_key};
 use crate::service::server_key_file;
 
-/// Make and show the keys by which services and labs know each other.
+/// Make and show the keys that services and labs use to recognise each other.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -15,10 +15,10 @@ Examples:
   apprentice keys show --file lab.key
   apprentice keys show --data labs
 
-A key file is for its owner alone; what others need is the public half, which is printed and stands
-in FILE.pub. The files are ZeroMQ certificates, which other programs read too.
+Keep the key file secret. Give others only the public key, which is printed and is also in FILE.pub.
+The files are ZeroMQ certificates. Other ZeroMQ programs can read them.
 
-Exit codes: 0 done, 2 a file that cannot be used.")]
+Exit codes: 0 done; 2 a file cannot be used.")]
 pub struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -26,18 +26,18 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Make a key for a gateway, an operator or an auditor, and print its public half.
+    /// Make a key for a gateway, an operator or an auditor, and print its public key.
     New {
-        /// Where the secret half goes, readable by you alone; the public half goes to FILE.pub.
+        /// The file for the secret key. Only you can read it. The public key goes to FILE.pub.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Print the public half of a key: of a file, or of the service in a data directory.
+    /// Print the public key of a key file, or of the service in a data directory.
     Show {
         /// A key file.
         #[arg(long, value_name = "FILE", conflicts_with = "data")]
         file: Option<PathBuf>,
-        /// A data directory; the key of its service is made when there is none yet
+        /// A data directory. The key of its service is made if it is missing
         /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
@@ -49,8 +49,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Verb::New { out } => {
             let key = CurveKey::new().map_err(Failure::failed)?;
             let public = key.write_new(&out).map_err(Failure::bad_input)?;
-            eprintln!("apprentice: the secret half is in {}; keep it", out.display());
-            eprintln!("apprentice: the public half is in {}", public.display());
+            eprintln!("apprentice: the secret key is in {}; keep it secret", out.display());
+            eprintln!("apprentice: the public key is in {}", public.display());
             key
         }
         Verb::Show { file: Some(file), .. } => CurveKey::read(&file).map_err(Failure::bad_input)?,

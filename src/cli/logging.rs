@@ -44,7 +44,7 @@ impl Logging {
         };
         let filter = EnvFilter::builder().parse(&text).map_err(|error| {
             Failure::bad_input(format!(
-                "{source} {text:?} is no log filter: {error}; say for example info or \
+                "{source} {text:?} is not a log filter: {error}; use for example info or \
                  apprentice::store=debug"
             ))
         })?;

@@ -16,10 +16,10 @@ use crate::tenancy::Order;
 /// How long a service may take to carry out an order.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Where tenants are decided about.
+/// Where an order goes: to a running service, or to a closed data directory.
 #[derive(Debug, Args)]
 pub struct Place {
-    /// A running service.
+    /// The endpoint of a running service.
     #[arg(long, value_name = "ENDPOINT", conflicts_with = "data")]
     connect: Option<String>,
     #[command(flatten)]
@@ -30,14 +30,14 @@ pub struct Place {
     data: Option<PathBuf>,
 }
 
-/// Who carries orders out. Both are the same [`Book`]; one of them is behind a service's registrar.
+/// What carries orders out: the [`Book`] of a running service, or of a closed directory.
 pub enum Office {
     Running(Client),
     Closed(Box<Book>),
 }
 
 impl Place {
-    /// - `make`: a data directory that is not there is made.
+    /// - `make`: whether to make a data directory that does not exist.
     pub fn enter(&self, make: bool) -> Result<Office, Failure> {
         if let Some(endpoint) = &self.connect {
             let client = self.passport.client(endpoint, embedded::user("operator")?)?;
@@ -45,7 +45,7 @@ impl Place {
         }
         if self.passport.is_given() {
             return Err(Failure::bad_input(
-                "--key is for a running service; name it with --connect",
+                "--key is for a running service; name the service with --connect",
             ));
         }
         let directory = data_dir::choose(self.data.clone())?;
@@ -54,7 +54,7 @@ impl Place {
         }
         let store = store::open(&directory).map_err(|error| match error {
             store::OpenError::InUse { .. } => Failure::bad_input(format!(
-                "{error}; a running service takes orders with --connect"
+                "{error}; to give orders to a running service, use --connect"
             )),
             error => Failure::bad_input(error),
         })?;
@@ -64,7 +64,7 @@ impl Place {
 }
 
 impl Office {
-    /// - returns: how many records it led to; 0 when it was so already.
+    /// - returns: how many records were added; 0 when the order changed nothing.
     pub fn obey(&mut self, tenant: &TenantId, order: Order) -> Result<u32, Failure> {
         match self {
             Office::Running(client) => {

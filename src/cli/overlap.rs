@@ -2,7 +2,7 @@
 ///
 /// - returns: seconds.
 pub(super) fn parse(text: &str) -> Result<u64, String> {
-    let wrong = || format!("{text:?} is no stretch of time; write 90s, 15m, 12h or 7d");
+    let wrong = || format!("{text:?} is not a length of time; write 90s, 15m, 12h or 7d");
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let factor: u64 = match &text[digits.len()..] {
         "s" => 1,

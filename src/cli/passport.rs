@@ -6,13 +6,13 @@ use super::failure::Failure;
 use crate::frontends::{Client, CurveKey, Identity, read_public};
 use crate::ids::UserId;
 
-/// Who comes, for a service that lets in only those with a key.
+/// The keys for a service that admits only known keys.
 #[derive(Debug, Args)]
 pub struct Passport {
-    /// Your key, as `apprentice keys new` made it.
+    /// Your key file, made by `apprentice keys new`.
     #[arg(long, value_name = "FILE", requires = "server_key")]
     key: Option<PathBuf>,
-    /// The service's public key: its 40 characters, or a file with them.
+    /// The service's public key: 40 characters, or a file that contains them.
     #[arg(long, value_name = "PUBLIC|FILE", requires = "key", allow_hyphen_values = true)]
     server_key: Option<String>,
 }
@@ -22,7 +22,7 @@ impl Passport {
         self.key.is_some() || self.server_key.is_some()
     }
 
-    /// - errors: with code 2, when an argument cannot be used. Nobody was spoken to yet.
+    /// - errors: with code 2, when an argument cannot be used. Nothing was sent yet.
     pub fn client(&self, endpoint: &str, user: UserId) -> Result<Client, Failure> {
         let client = match (&self.key, &self.server_key) {
             (Some(key), Some(server)) => {

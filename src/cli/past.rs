@@ -9,17 +9,17 @@ use super::{data_dir, embedded};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::store::{self, OpenError, PrivateCopy, Store};
 
-/// Whose past.
+/// Whose records to read.
 #[derive(Debug, Args)]
 pub struct Whose {
-    /// The data directory; it is copied first, and the copy is read
+    /// The data directory. The command works on a copy of it
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// The lab the person belongs to.
+    /// The lab of the user.
     #[arg(long, value_name = "NAME", default_value = "local")]
     tenant: String,
-    /// The person.
+    /// The user.
     #[arg(long, value_name = "NAME")]
     user: String,
 }
@@ -68,7 +68,7 @@ pub fn open(flag: Option<PathBuf>) -> Result<Past, Failure> {
 }
 
 impl Past {
-    /// - errors: with code 2 when nobody of `tenant` was ever recorded.
+    /// - errors: with code 2 when `tenant` has no records.
     pub fn check_tenant(&self, tenant: &TenantId) -> Result<(), Failure> {
         let known = self.store.log.tenants().map_err(Failure::failed)?;
         if known.contains(tenant) {
@@ -76,7 +76,7 @@ impl Past {
         }
         let known: Vec<&str> = known.iter().map(TenantId::as_str).collect();
         let known = match known.is_empty() {
-            true => "nobody was recorded yet".to_owned(),
+            true => "it holds no records yet".to_owned(),
             false => format!("its tenants are {}; name one of them", known.join(", ")),
         };
         Err(Failure::bad_input(format!(
@@ -97,14 +97,14 @@ impl Past {
         }
     }
 
-    /// Why there is nothing of `user`: behind another secret everybody is a stranger.
+    /// Why there are no records of `user`: the name may be wrong, or the tenant's secret may be.
     fn stranger(&self, tenant: &TenantId, user: &UserId) -> Failure {
         let recorded = self.store.log.streams(tenant).unwrap_or_default();
         match self.store.keys.check_opens(tenant, &recorded) {
             Err(error) => Failure::bad_input(error),
             Ok(()) => Failure::bad_input(format!(
-                "{} holds no records of user {:?} in tenant {tenant}; name a person who talked \
-                 with this directory's service",
+                "{} holds no records of user {:?} in tenant {tenant}; name a user who talked to \
+                 the service of this directory",
                 self.directory.display(),
                 user.as_str()
             )),

@@ -10,10 +10,10 @@ use crate::actors::fold_tenant;
 use crate::ids::Seq;
 use crate::replay::{self, ProveError, Wanted};
 
-/// Write a proof that one record stood in the log when a checkpoint was signed.
+/// Write a proof that a record was in the log when a checkpoint was signed.
 ///
-/// The file stands on its own: `apprentice verify` and tools/verify.py check it with the log's public
-/// key and nothing else. The record in it is sealed and tells nothing but times and lengths.
+/// `apprentice verify` and tools/verify.py need only this file and the log's public key. The record in
+/// the file is sealed. It shows only times and lengths.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -21,24 +21,24 @@ Examples:
   apprentice proof --data lab --user ada --seq 17 --reveal --out ada-17-open.proof
   apprentice proof --data lab --user ada --seq 17 --since may.checkpoint --out ada-17.proof
 
-`apprentice log show --user ada` prints the numbers of records. A record is covered when its episode
-has ended, or after `apprentice checkpoint`.
+`apprentice log show --user ada` prints the numbers of records. A checkpoint covers a record after its
+episode has ended, or after `apprentice checkpoint`.
 
-Exit codes: 1 the record is not covered yet, or the log is not the one that was signed; 2 the
-directory, the person or a file cannot be used.")]
+Exit codes: 1 no checkpoint covers the record yet, or the log is not the one that was signed; 2 the
+directory, the user or a file cannot be used.")]
 pub struct Arguments {
     #[command(flatten)]
     whose: Whose,
     /// The number of the record.
     #[arg(long, value_name = "N")]
     seq: NonZeroU64,
-    /// Put what the record says into the file, in the clear, with what shows that it is this.
+    /// Put the decrypted record into the file, with the evidence that it is the right one.
     #[arg(long)]
     reveal: bool,
-    /// Show also that the log only grew since this checkpoint.
+    /// Also prove that the log only grew since this checkpoint.
     #[arg(long, value_name = "OLD_CHECKPOINT")]
     since: Option<PathBuf>,
-    /// Write to this file instead of to standard output.
+    /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

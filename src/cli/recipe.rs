@@ -17,14 +17,15 @@ pub fn load(name: &str) -> Result<String, Failure> {
     let known = Recipe::BUILTIN.join(", ");
     let unreadable = |error: std::io::Error| {
         Failure::bad_input(format!(
-            "recipe {name:?} is none of {known} and cannot be read as a file: {error}"
+            "there is no recipe {name:?}, and it cannot be read as a file: {error}; the recipes are \
+             {known}"
         ))
     };
     let path = Path::new(name);
     let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
     if bytes > RECIPE_BYTES_MAX {
         return Err(Failure::bad_input(format!(
-            "recipe {name} has {bytes} bytes; at most {RECIPE_BYTES_MAX} are read"
+            "recipe {name} has {bytes} bytes; the limit is {RECIPE_BYTES_MAX}"
         )));
     }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;

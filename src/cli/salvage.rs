@@ -5,28 +5,29 @@ use serde_json::json;
 
 use super::data_dir;
 use super::failure::Failure;
-use super::shown;
+use super::{shown, terminal::count};
 use crate::ids::TenantId;
 use crate::store::{self, Salvaged, Share};
 
-/// Rescue what can be read of a damaged data directory into a new one.
+/// Copy everything readable from a damaged data directory into a new one.
 ///
-/// Every person's records are copied up to the first that is missing or damaged, with all keys. The
-/// directory itself is not changed, and its database need not open.
+/// Copies all keys, and each user's records up to the first record that is missing or damaged. Does
+/// not change the damaged directory. Works even if its database does not open.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   apprentice salvage --data lab --out lab-rescued
   apprentice salvage --data lab --out lab-rescued --json | jq .lost
 
-Stopped half-way it leaves DIR2.unfinished, which the next run replaces; DIR2 is whole or not there.
+If it is interrupted, it leaves DIR2.unfinished, which the next run replaces. DIR2 appears only when
+it is complete.
 
-Exit codes: 0 nothing was lost, 1 something was lost (it is listed), 2 nothing could be rescued.")]
+Exit codes: 0 nothing was lost; 1 something was lost (it is listed); 2 nothing could be rescued.")]
 pub struct Arguments {
     /// The damaged data directory [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// The new directory; it must not exist, or be empty.
+    /// The new directory. It must be empty or not exist.
     #[arg(long, value_name = "DIR2")]
     out: PathBuf,
     /// Print one JSON object.
@@ -66,7 +67,10 @@ fn of_tenant(tenant: &TenantId, share: &Share) -> String {
     );
     match hurt {
         0 => format!("{kept}; lost nothing"),
-        _ => format!("{kept}; lost something of {hurt} streams, {lost} records at least"),
+        _ => {
+            let (streams, lost) = (count(*hurt, "stream"), count(*lost, "record"));
+            format!("{kept}; lost something in {streams} (at least {lost})")
+        }
     }
 }
 
@@ -79,11 +83,11 @@ fn losses(salvaged: &Salvaged) -> Vec<String> {
     }
     if let Some(reason) = &salvaged.heads_damage {
         lost.push(format!(
-            "the heads file, so that records may be missing at any stream's end: {reason}"
+            "the heads file, so records may be missing at the end of any stream: {reason}"
         ));
     }
     if salvaged.unclaimed > 0 {
-        lost.push(format!("{} streams whose tenant is not known any more", salvaged.unclaimed));
+        lost.push(format!("{} streams whose tenant is unknown", salvaged.unclaimed));
     }
     lost.extend(salvaged.lost_keys.iter().map(|key| format!("the key file {key}")));
     lost

@@ -8,15 +8,15 @@ use crate::learning::code_digest;
 use crate::numerics::{Kernel, NumericsVersion};
 use crate::study::known_minds::train_all;
 
-/// Check that this machine learns the same bits as every other.
+/// Check that this machine trains exactly the same minds as every other machine.
 ///
-/// Trains a few known histories and compares the digests of their minds with those that this version
-/// has everywhere. A mind that was learned elsewhere comes back here only if they agree.
+/// Trains the minds of a few known histories and compares their digests with the known ones. If they
+/// differ, do not move data to or from this machine.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 every digest agrees; 1 some do not, and each line says which.")]
+Exit codes: 0 all digests agree; 1 some differ (each line says which).")]
 pub struct Arguments {
-    /// One JSON object a line, with whole digests.
+    /// Print one JSON object per line, with full digests.
     #[arg(long)]
     json: bool,
 }
@@ -24,9 +24,9 @@ pub struct Arguments {
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     let mut print = |line: String| {
-        writeln!(stdout, "{line}").and_then(|()| stdout.flush()).map_err(|error| {
-            Failure::failed(format!("standard output cannot be written to: {error}"))
-        })
+        writeln!(stdout, "{line}")
+            .and_then(|()| stdout.flush())
+            .map_err(|error| Failure::failed(format!("standard output cannot be written: {error}")))
     };
     let (mut trained, mut differ) = (0, 0);
     for known in train_all() {
@@ -47,9 +47,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
                 known.history,
                 known.digest.short(),
                 match (known.agrees(), known.pinned) {
-                    (true, _) => "as everywhere".to_owned(),
-                    (false, Some(pinned)) => format!("DIFFERS: {} elsewhere", pinned.short()),
-                    (false, None) => "is not pinned".to_owned(),
+                    (true, _) => "agrees".to_owned(),
+                    (false, Some(pinned)) => format!("DIFFERS: expected {}", pinned.short()),
+                    (false, None) => "has no known digest".to_owned(),
                 }
             ),
         })?;

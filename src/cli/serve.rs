@@ -9,7 +9,7 @@ use crate::frontends::show_key;
 use crate::service::Data;
 use crate::store::FaultPlan;
 
-/// Serve people and programs over ZeroMQ.
+/// Serve users and programs over ZeroMQ.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -19,36 +19,36 @@ Examples:
   apprentice serve --data labs --curve tcp://0.0.0.0:7117 --feed tcp://0.0.0.0:7200
   apprentice serve --data trial --zmq tcp://127.0.0.1:7117 --fault-plan deploy/drills/bad-day.toml
 
-Standard output names the endpoints that were opened, one on a line (a port 0 takes a free one), and
-the service's own key, which those need who come in by --curve.
-schema/wire.md describes the wire. SIGTERM and SIGINT end it in order; a kill loses nothing that was
-answered either.
+The service prints each endpoint that it opened on a line of standard output. Port 0 means a free
+port. With --curve it also prints its own public key, which every client needs.
+SIGTERM and SIGINT stop the service. A kill loses nothing that was answered.
+schema/wire.md describes the messages.
 
-Exit codes: 0 it was stopped, 1 the service cannot go on, 2 the directory or the endpoint cannot be used.")]
+Exit codes: 0 it was stopped; 1 the service failed; 2 the directory or an endpoint cannot be used.")]
 pub struct Arguments {
-    /// Where everything is kept [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
+    /// The data directory [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Where to listen without keys; may be given again. Everybody who reaches it may talk as
-    /// anybody and give orders, so it is loopback or a socket file.
+    /// Listen here without keys. You can repeat this option. Anyone who can connect can speak for
+    /// every user and give orders, so only loopback and socket files are allowed.
     #[arg(long, value_name = "ENDPOINT", required_unless_present = "curve")]
     zmq: Vec<String>,
-    /// Where to listen with keys, on any address; may be given again. Only those come in whose key
-    /// `apprentice tenant admit` let in.
+    /// Listen here with keys, on any address. You can repeat this option. Only keys that you admitted
+    /// with `apprentice tenant admit` can connect.
     #[arg(long, value_name = "ENDPOINT")]
     curve: Vec<String>,
-    /// Where to publish what is recorded: each lab with auditors or operators gets two endpoints of
-    /// its own, one of sealed records and one of plain ones. With a port, the ports from there on.
+    /// Publish new records here. Each lab with auditors or operators gets two endpoints: one for
+    /// sealed records and one for plain records. If you give a port, the next ports are used too.
     #[arg(long, value_name = "ENDPOINT", requires = "curve")]
     feed: Option<String>,
-    /// The service's own key, made when missing [default: keys/server.curve in the data directory]
+    /// The service's own key. It is made if it is missing [default: keys/server.curve in the data directory]
     #[arg(long, value_name = "FILE", requires = "curve")]
     server_key: Option<PathBuf>,
-    /// The recipe that new people start with: default, default-1, default-2, paper, grammar, seq2seq,
+    /// The recipe for new users: default, default-1, default-2, paper, grammar, seq2seq,
     /// seq2seq-grammar, or a file.
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     recipe: String,
-    /// Let appends fail on purpose, by this plan: a drill, never for real participants.
+    /// Make writes fail on purpose, by this plan. Only for drills, never with real participants.
     #[arg(long, value_name = "FILE")]
     fault_plan: Option<PathBuf>,
 }
@@ -60,7 +60,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let directory = data_dir::choose(arguments.data)?;
     eprintln!("apprentice: everything is kept in {}", directory.display());
     if faults.is_some() {
-        eprintln!("apprentice: FAULT DRILL: appends fail on purpose; let no participant in");
+        eprintln!("apprentice: FAULT DRILL: writes fail on purpose; do not let participants in");
     }
     let data = Data::Directory(directory);
     let wanted = Wanted {
@@ -74,7 +74,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     };
     let service = embedded::start(wanted)?;
     ctrlc::set_handler(service.stopper())
-        .map_err(|error| Failure::failed(format!("signals cannot be heard: {error}")))?;
+        .map_err(|error| Failure::failed(format!("signals cannot be handled: {error}")))?;
     for endpoint in service.endpoints() {
         println!("serving at {endpoint}");
         tracing::info!(%endpoint, "serving");

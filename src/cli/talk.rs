@@ -6,12 +6,12 @@ use super::failure::Failure;
 use super::passport::Passport;
 use super::{embedded, terminal};
 
-/// How long a service may take to say hello before it is taken for absent.
+/// How long to wait for a service to say hello.
 const HELLO_PATIENCE: Duration = Duration::from_secs(5);
 /// How long one request is retried once the conversation runs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Talk to a service that runs elsewhere.
+/// Talk to a running service.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -19,21 +19,20 @@ Examples:
   apprentice talk --connect tcp://127.0.0.1:7117 --user ada < requests.txt
   apprentice talk --connect tcp://robot.example:7117 --user ada --key lab.key --server-key server.pub
 
-Exit codes: 0 the conversation ended, 1 no answer or the service failed, 2 bad usage.")]
+Exit codes: 0 the conversation ended; 1 the service failed or did not answer; 2 the arguments are wrong.")]
 pub struct Arguments {
-    /// Where the service listens.
+    /// The address of the service.
     #[arg(long, value_name = "ENDPOINT")]
     connect: String,
     #[command(flatten)]
     passport: Passport,
-    /// Who is talking: each person teaches a robot of their own.
+    /// Your name. Each user has their own robot and their own lessons.
     #[arg(long, value_name = "NAME", default_value = "you")]
     user: String,
-    /// Fixes scenes and tasks; the next episode has the next seed.
+    /// Fixes the scenes and the tasks. Each new task uses the next seed.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// What the first tasks are about, in order; give it again for the next one. Later tasks are
-    /// drawn.
+    /// The first task. Repeat the option to choose the tasks after it. Later tasks are random.
     #[arg(long, value_name = "'clean Mug CounterTop'")]
     task: Vec<String>,
 }

@@ -12,7 +12,7 @@ use crate::frontends::{read_public, show_key};
 use crate::ids::{PublicKey, TenantId};
 use crate::tenancy::{Order, Quotas, Role};
 
-/// Say which labs are served, with which keys, and how much of the machine each may take.
+/// Manage the labs that a service serves, their keys and their quotas.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples, before the service first starts and while it runs:
@@ -23,11 +23,12 @@ Examples, before the service first starts and while it runs:
       --connect tcp://robot.example:7117 --key operator.key --server-key server.pub
   apprentice tenant quotas lab-a --utterances-per-second 20 --connect ipc:///run/apprentice/operator
 
-Whoever comes through a door without keys, and operators of tenant `local`, may do all of it; an operator
-of another tenant may list it and admit, retire and rotate its keys. An order that was carried out already
-is carried out again without harm.
+Operators of tenant `local` may do all of this, and so may clients of an endpoint without keys. An
+operator of another tenant may list that tenant and admit, retire and rotate its keys. You can safely
+repeat an order.
 
-Exit codes: 0 done, 1 refused or no answer, 2 an argument or a directory that cannot be used.")]
+Exit codes: 0 done; 1 the order was refused or not answered; 2 an argument or a directory cannot be
+used.")]
 pub struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -35,74 +36,74 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// A new tenant, with a secret of its own.
+    /// Add a tenant. It gets its own secret.
     Add {
         tenant: String,
         #[command(flatten)]
         place: Place,
     },
-    /// Tenants with their keys and quotas.
+    /// List tenants with their keys and quotas.
     List {
-        /// Only this one.
+        /// List only this tenant.
         tenant: Option<String>,
         #[command(flatten)]
         place: Place,
     },
-    /// Shut a tenant out: its open connections are denied at their next message.
+    /// Block a tenant. Its open connections are refused at their next message.
     Disable {
         tenant: String,
-        /// For operators; clients are not told.
+        /// The reason, for operators. Clients do not see it.
         #[arg(long, value_name = "TEXT", default_value = "")]
         reason: String,
         #[command(flatten)]
         place: Place,
     },
-    /// Let a disabled tenant in again.
+    /// Unblock a disabled tenant.
     Enable {
         tenant: String,
         #[command(flatten)]
         place: Place,
     },
-    /// Let a key in, as this tenant. One key is one tenant's.
+    /// Admit a key for this tenant. A key belongs to one tenant.
     Admit {
         tenant: String,
-        /// The public half: its 40 characters, or a file with them.
+        /// The public key: 40 characters, or a file that contains them.
         #[arg(value_name = "PUBLIC|FILE", allow_hyphen_values = true)]
         public: String,
-        /// gateway (people's requests), operator (keys and orders) or auditor (sealed records).
+        /// gateway (user requests), operator (keys and orders) or auditor (sealed records).
         #[arg(long, value_name = "ROLE")]
         role: Role,
-        /// For operators: where this key is.
+        /// A note for operators, for example where this key is.
         #[arg(long, value_name = "TEXT", default_value = "")]
         label: String,
         #[command(flatten)]
         place: Place,
     },
-    /// Take a key back. It never comes in again.
+    /// Retire a key. It can never be admitted again.
     Retire {
         tenant: String,
         #[arg(value_name = "PUBLIC|FILE", allow_hyphen_values = true)]
         public: String,
-        /// It stays good for so long: 90s, 15m, 12h, 7d; at most 30d.
+        /// The key keeps working for this long: 90s, 15m, 12h, 7d; at most 30d.
         #[arg(long, value_name = "TIME", default_value = "0s", value_parser = overlap::parse)]
         overlap: u64,
         #[command(flatten)]
         place: Place,
     },
-    /// Let a new key in, in an old one's role, and retire the old one after a while.
+    /// Admit a new key with the role of an old key, and retire the old key later.
     RotateKey {
         tenant: String,
         #[arg(value_name = "OLD|FILE", allow_hyphen_values = true)]
         old: String,
         #[arg(value_name = "NEW|FILE", allow_hyphen_values = true)]
         new: String,
-        /// Both are good for so long: 90s, 15m, 12h, 7d; at most 30d.
+        /// Both keys work for this long: 90s, 15m, 12h, 7d; at most 30d.
         #[arg(long, value_name = "TIME", value_parser = overlap::parse)]
         overlap: u64,
         #[command(flatten)]
         place: Place,
     },
-    /// Show what a tenant may take, or set it: what is not named then has no limit but the machine's.
+    /// Show or set quotas. If you set any quota, every quota that you leave out becomes unlimited.
     Quotas {
         tenant: String,
         #[command(flatten)]
@@ -112,28 +113,28 @@ enum Verb {
     },
 }
 
-/// None of them given: the quotas are shown.
+/// If none of them is given, the quotas are shown.
 #[derive(Debug, Args)]
 struct Limits {
-    /// People awake at once.
+    /// Users in memory at the same time.
     #[arg(long, value_name = "N")]
     awake_users: Option<u32>,
-    /// Requests taken and not yet answered.
+    /// Unanswered requests.
     #[arg(long, value_name = "N")]
     in_flight: Option<u32>,
-    /// Utterances a second, in the long run.
+    /// Utterances per second, on average.
     #[arg(long, value_name = "N")]
     utterances_per_second: Option<u32>,
-    /// Utterances at once after a silence.
+    /// Utterances in a burst, after a pause.
     #[arg(long, value_name = "N")]
     burst: Option<u32>,
-    /// Sealed bytes in the log, all in all.
+    /// Sealed bytes in the log, in total.
     #[arg(long, value_name = "BYTES")]
     sealed_bytes: Option<u64>,
-    /// Trainings waiting.
+    /// Trainings in the queue.
     #[arg(long, value_name = "N")]
     trainings_waiting: Option<u32>,
-    /// Take all limits away.
+    /// Remove all limits.
     #[arg(long, conflicts_with_all = [
         "awake_users", "in_flight", "utterances_per_second", "burst", "sealed_bytes",
         "trainings_waiting",
@@ -189,7 +190,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     };
     let said = match (office.obey(&tenant, order)?, retired) {
         (0, Some(key)) => as_retired(&mut office, &tenant, &key),
-        (0, None) => "it was so already".to_owned(),
+        (0, None) => "nothing changed; this was already done".to_owned(),
         _ => "done".to_owned(),
     };
     println!("tenant {tenant}: {said}");
@@ -202,14 +203,14 @@ fn as_retired(office: &mut Office, tenant: &TenantId, key: &PublicKey) -> String
     let tenants = office.list(Some(tenant)).unwrap_or_default();
     let known = tenants.iter().flat_map(|view| &view.keys).find(|known| known.key == *key);
     let retired_before = match known.map(|known| (known.retired, known.valid_until)) {
-        Some((true, _)) => "the key was retired before and never comes in again".to_owned(),
+        Some((true, _)) => "the key is already retired and cannot be admitted again".to_owned(),
         Some((false, Some(until))) => format!(
-            "the key was retired before and comes in until {}, no later than you ask for now",
+            "the key is already retired and works until {}, which is not later than you asked for",
             utc(until)
         ),
-        Some((false, None)) | None => "the key was retired before".to_owned(),
+        Some((false, None)) | None => "the key is already retired".to_owned(),
     };
-    format!("nothing was recorded; {retired_before}")
+    format!("nothing changed; {retired_before}")
 }
 
 fn name(text: &str) -> Result<TenantId, Failure> {
@@ -224,7 +225,9 @@ fn list(office: &mut Office, only: Option<TenantId>) -> Result<(), Failure> {
     let tenants = office.list(only.as_ref())?;
     match (&only, tenants.is_empty()) {
         (Some(tenant), true) => return Err(absent(tenant)),
-        (None, true) => eprintln!("apprentice: no tenant yet; `apprentice tenant add` makes one"),
+        (None, true) => {
+            eprintln!("apprentice: there are no tenants yet; `apprentice tenant add` makes one")
+        }
         (_, false) => {}
     }
     tenants.iter().for_each(show);
@@ -232,7 +235,9 @@ fn list(office: &mut Office, only: Option<TenantId>) -> Result<(), Failure> {
 }
 
 fn absent(tenant: &TenantId) -> Failure {
-    Failure::failed(format!("there is no tenant {tenant}; `apprentice tenant list` shows them all"))
+    Failure::failed(format!(
+        "there is no tenant {tenant}; `apprentice tenant list` shows the tenants"
+    ))
 }
 
 fn show(view: &TenantView) {

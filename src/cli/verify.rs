@@ -9,9 +9,9 @@ use super::{log, shown};
 use crate::events::{Record, decode};
 use crate::evidence::{self, Proof, Verified, VerifiedRecord, VerifierKey};
 
-/// Check a proof that `apprentice proof` or `apprentice checkpoint` made.
+/// Check a proof made by `apprentice proof` or `apprentice checkpoint`.
 ///
-/// Needs the file and the log's public key, no data directory and no network.
+/// You need only the file and the log's public key: no data directory and no network.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -21,20 +21,20 @@ Examples:
 
 docs/evidence.md says what a proof shows and what it does not.
 
-Exit codes: 0 everything holds; 1 something does not, and the sentence says what; 2 the file is no
-proof, or the key is none.")]
+Exit codes: 0 the proof is valid; 1 it is not valid (the message says why); 2 the file is not a proof,
+or the key is not a key.")]
 pub struct Arguments {
-    /// The proof.
+    /// The file with the proof.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// The log's public key, or a file that holds it. It must come from somebody you trust, not with
-    /// the proof.
+    /// The log's public key, or a file that contains it. Get it from somebody you trust, not together
+    /// with the proof.
     #[arg(long, value_name = "KEY")]
     key: String,
-    /// A checkpoint kept from earlier: the log must have grown from it and lost nothing.
+    /// An older checkpoint that you kept. The log must contain everything that it covers.
     #[arg(long, value_name = "OLD_CHECKPOINT")]
     since: Option<PathBuf>,
-    /// One JSON object.
+    /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }
@@ -43,7 +43,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let key = public_key(&arguments.key)?;
     let bytes = read(&arguments.file)?;
     let proof = Proof::parse(&bytes).map_err(|error| {
-        Failure::bad_input(format!("{} is no proof: {error}", arguments.file.display()))
+        Failure::bad_input(format!("{} is not a proof: {error}", arguments.file.display()))
     })?;
     let since = arguments.since.as_deref().map(read).transpose()?;
     // What is no text is no checkpoint either, and is refused as that.
@@ -102,7 +102,7 @@ fn readable(verified: &Verified) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(record) = &verified.record {
         let (seq, stream) = (record.header.seq, record.header.stream);
-        lines.push(format!("record {seq} of stream {stream} stood in the log"));
+        lines.push(format!("record {seq} of stream {stream} was in the log"));
         lines.push(format!("  digest {}", record.digest));
         match opened(record) {
             None => lines.push("  its body is sealed and was not revealed".to_owned()),

@@ -160,7 +160,7 @@ impl FromStr for Role {
     fn from_str(text: &str) -> Result<Role, String> {
         Role::ALL.into_iter().find(|role| role.name() == text).ok_or_else(|| {
             let shown: String = text.chars().take(40).collect();
-            format!("{shown:?} is no role; the roles are gateway, operator and auditor")
+            format!("{shown:?} is not a role; the roles are gateway, operator and auditor")
         })
     }
 }
@@ -191,7 +191,7 @@ impl fmt::Display for Quotas {
                 written = true;
             }
         }
-        if written { Ok(()) } else { f.write_str("no limits but the machine's") }
+        if written { Ok(()) } else { f.write_str("no limits") }
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Checkpoint {
 pub enum CheckpointError {
     #[error(transparent)]
     Note(#[from] NoteError),
-    #[error("it is no checkpoint: {reason}")]
+    #[error("it is not a checkpoint: {reason}")]
     Form { reason: &'static str },
     #[error("it is a checkpoint of {found}, not of {expected}")]
     Origin { found: String, expected: String },
@@ -64,9 +64,9 @@ impl Checkpoint {
         else {
             return Err(wrong("fewer than three lines"));
         };
-        check_name(origin).map_err(|_| wrong("its first line is no origin"))?;
-        let size = number(size).ok_or_else(|| wrong("its second line is no size"))?;
-        let root = tree_hash(root).ok_or_else(|| wrong("its third line is no hash"))?;
+        check_name(origin).map_err(|_| wrong("its first line is not an origin"))?;
+        let size = number(size).ok_or_else(|| wrong("its second line is not a size"))?;
+        let root = tree_hash(root).ok_or_else(|| wrong("its third line is not a hash"))?;
         if lines.any(str::is_empty) {
             return Err(wrong("it holds an empty line"));
         }

@@ -21,11 +21,11 @@ const NAME_BYTES_MAX: usize = 255;
 /// Why a note shows nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoteError {
-    #[error("it is no signed note: {reason}")]
+    #[error("it is not a signed note: {reason}")]
     Form { reason: &'static str },
-    #[error("the note carries no signature of {key}")]
+    #[error("the note has no signature by {key}")]
     Unsigned { key: String },
-    #[error("the signature of {key} does not fit the note")]
+    #[error("the signature by {key} does not match the note")]
     Signature { key: String },
 }
 
@@ -108,11 +108,12 @@ fn parts(note: &str) -> Result<(&str, Signatures<'_>), NoteError> {
         if signatures.len() == SIGNATURES_MAX {
             return Err(wrong("too many signatures"));
         }
-        let line = line.strip_prefix(MARK).ok_or_else(|| wrong("a line that is no signature"))?;
+        let line =
+            line.strip_prefix(MARK).ok_or_else(|| wrong("a line that is not a signature"))?;
         let (name, bytes) =
             line.split_once(' ').ok_or_else(|| wrong("a signature without a name"))?;
         check_name(name).map_err(|_| wrong("a signature without a proper name"))?;
-        let bytes = STANDARD.decode(bytes).map_err(|_| wrong("a signature that is no base64"))?;
+        let bytes = STANDARD.decode(bytes).map_err(|_| wrong("a signature that is not base64"))?;
         if bytes.len() < 5 {
             return Err(wrong("a signature that is too short"));
         }
@@ -151,7 +152,7 @@ impl FromStr for VerifierKey {
             return Err(wrong("another kind of key at its end"));
         };
         let key: &[u8; 32] = key.try_into().map_err(|_| wrong("a key of another length"))?;
-        let key = VerifyingKey::from_bytes(key).map_err(|_| wrong("a key that is no point"))?;
+        let key = VerifyingKey::from_bytes(key).map_err(|_| wrong("a key that is not a point"))?;
         if key.is_weak() {
             return Err(wrong("a weak key, for which signatures show nothing"));
         }

@@ -69,13 +69,13 @@ pub struct Consistency {
 pub enum ProofError {
     #[error("it does not begin with the line {TITLE:?}")]
     Title,
-    #[error("it holds bytes that are no text")]
+    #[error("it holds bytes that are not text")]
     Text,
-    #[error("no blank line stands between the proof and the checkpoint")]
+    #[error("there is no blank line between the proof and the checkpoint")]
     Blank,
     #[error("line {line}: {reason}")]
     Line { line: usize, reason: String },
-    #[error("it shows nothing: neither a record nor an older checkpoint is spoken of")]
+    #[error("it proves nothing: it names neither a record nor an older checkpoint")]
     Nothing,
 }
 
@@ -165,13 +165,13 @@ impl<'t> Lines<'t> {
             return Err(self.wrong("more hashes than any path has"));
         }
         let hashes: Option<Vec<TreeHash>> = words.iter().map(|word| tree_hash(word)).collect();
-        hashes.ok_or_else(|| self.wrong("a word that is no hash of 32 bytes in base64"))
+        hashes.ok_or_else(|| self.wrong("a word that is not a hash of 32 bytes in base64"))
     }
 
     fn inclusion(&mut self) -> Result<Option<Inclusion>, ProofError> {
         let Some(words) = self.optional("record") else { return Ok(None) };
         let [frame] = words[..] else { return Err(self.wrong("one word should follow")) };
-        let base64 = || "a word that is no base64";
+        let base64 = || "a word that is not base64";
         let frame = STANDARD.decode(frame).map_err(|_| self.wrong(base64()))?;
         let revealed = match self.optional("revealed").as_deref() {
             None => None,
@@ -189,17 +189,17 @@ impl<'t> Lines<'t> {
         };
         let seq = |word| number(word).and_then(Seq::new);
         let (Some(first), Some(last)) = (seq(first), seq(last)) else {
-            return Err(self.wrong("a word that is no sequence number"));
+            return Err(self.wrong("a word that is not a sequence number"));
         };
         let stream = hex(stream, |text| text.parse::<StreamKey>().ok());
-        let stream = stream.ok_or_else(|| self.wrong("a word that is no stream key"))?;
+        let stream = stream.ok_or_else(|| self.wrong("a word that is not a stream key"))?;
         let head = hex(head, |text| text.parse::<Digest>().ok());
-        let head = head.ok_or_else(|| self.wrong("a word that is no digest"))?;
+        let head = head.ok_or_else(|| self.wrong("a word that is not a digest"))?;
         let words = self.wanted("segment-path")?;
         let segment_path = self.path(&words)?;
         let words = self.wanted("leaf")?;
         let [leaf] = words[..] else { return Err(self.wrong("one word should follow")) };
-        let leaf = number(leaf).ok_or_else(|| self.wrong("a word that is no number"))?;
+        let leaf = number(leaf).ok_or_else(|| self.wrong("a word that is not a number"))?;
         let words = self.wanted("tree-path")?;
         let tree_path = self.path(&words)?;
         Ok(Some(Inclusion {

@@ -32,32 +32,32 @@ pub enum VerifyError {
     Older(CheckpointError),
     #[error("the record is not as it was written: {0}")]
     Record(HeaderError),
-    #[error("the record is number {seq} of stream {stream}, which is not in the segment named")]
+    #[error("the record is number {seq} of stream {stream}, and the segment does not contain it")]
     Elsewhere { stream: String, seq: u64 },
-    #[error("the path in the segment does not fit its number of records")]
+    #[error("the path in the segment does not match its number of records")]
     SegmentPath,
-    #[error("the record is the last of its segment and has another digest than its head")]
+    #[error("the record is the last of its segment, but its digest is not the segment's head")]
     Head,
-    #[error("the path in the tree does not fit the place and the tree's size of {size}")]
+    #[error("the path in the tree does not match the position and the tree's size of {size}")]
     TreePath { size: u64 },
     #[error(
-        "record and paths lead to the root {found}, the checkpoint was signed over {signed}: the \
-         record is not the one that the log held"
+        "the record and its paths give the root {found}, but the checkpoint signs {signed}: this is \
+         not the record that was in the log"
     )]
     Root { found: TreeHash, signed: TreeHash },
-    #[error("salt and body are not the ones that the record commits to")]
+    #[error("the salt and the body do not match the commitment in the record")]
     Commitment,
     #[error(
-        "the log was rolled back: the older checkpoint has {older} segments, this one only {newer}"
+        "the log was rolled back: the older checkpoint has {older} segments, but this one only {newer}"
     )]
     RolledBack { older: u64, newer: u64 },
     #[error(
-        "the file says nothing of how the log grew from {older} segments to {newer}; ask for a \
-         proof made with --since and the older checkpoint"
+        "the file does not show how the log grew from {older} segments to {newer}; ask for a proof \
+         made with --since and the older checkpoint"
     )]
     NotShown { older: u64, newer: u64 },
     #[error(
-        "the log was forked: its {newer} segments do not begin with the {older} of the older \
+        "the log was forked: its {newer} segments do not begin with the {older} segments of the older \
          checkpoint"
     )]
     Forked { older: u64, newer: u64 },

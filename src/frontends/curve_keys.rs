@@ -21,7 +21,9 @@ pub struct CurveKey {
 /// Why a key cannot be had.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CurveKeyError {
-    #[error("the key file {path} is there already; name another, or remove it if nobody needs it")]
+    #[error(
+        "the key file {path} already exists; name another file, or remove it if it is not needed"
+    )]
     Exists { path: String },
     #[error("there is no key file {path}; make one with `apprentice keys new --out {path}`")]
     Absent { path: String },
@@ -32,11 +34,11 @@ pub enum CurveKeyError {
     #[error("the key file {path} cannot be used: {reason}")]
     Io { path: String, reason: String },
     #[error(
-        "{text:?} is no public key: expected its 40 characters, or a file that holds them, such as \
+        "{text:?} is not a public key: expected 40 characters, or a file that contains them, such as \
          the .pub file that `apprentice keys new` writes"
     )]
     NoPublicKey { text: String },
-    #[error("this build of ZeroMQ makes no keys: {reason}; {}", super::lock::MEND)]
+    #[error("this build of ZeroMQ cannot make keys: {reason}; {}", super::lock::MEND)]
     NoCurve { reason: String },
 }
 
@@ -66,7 +68,7 @@ impl CurveKey {
     /// - errors: the file is there: a key that is in use must not be written over.
     pub fn write_new(&self, path: &Path) -> Result<PathBuf, CurveKeyError> {
         let secret = Zeroizing::new(format!(
-            "# A secret CURVE key of apprentice: whoever has it comes in as you.\n\
+            "# A secret CURVE key of apprentice. Anyone who has it can connect as you.\n\
              curve\n    public-key = \"{}\"\n    secret-key = \"{}\"\n",
             z85::show(&self.public),
             *Zeroizing::new(z85::encode(&self.secret)),
@@ -93,8 +95,8 @@ impl CurveKey {
         let field = |name| certificate_field(&text, name);
         let public = field("public-key").ok_or(damaged("it holds no public-key"))?;
         let secret = field("secret-key").ok_or(damaged("it holds no secret-key"))?;
-        let public = z85::read(public).ok_or(damaged("its public-key is no key"))?;
-        let secret = z85::decode(secret).ok_or(damaged("its secret-key is no key"))?;
+        let public = z85::read(public).ok_or(damaged("its public-key is not a key"))?;
+        let secret = z85::decode(secret).ok_or(damaged("its secret-key is not a key"))?;
         Ok(CurveKey { public, secret: Zeroizing::new(secret) })
     }
 
@@ -147,12 +149,12 @@ fn read_text(path: &Path) -> Result<(Zeroizing<String>, u32), CurveKeyError> {
     };
     let meta = fs::metadata(path).map_err(cannot)?;
     if !meta.is_file() || meta.len() > KEY_FILE_BYTES_MAX {
-        let reason = "it is no file of a few lines";
+        let reason = "it is not a file of a few lines";
         return Err(CurveKeyError::Malformed { path: show(path), reason });
     }
     let bytes = Zeroizing::new(fs::read(path).map_err(cannot)?);
     let text = std::str::from_utf8(&bytes)
-        .map_err(|_| CurveKeyError::Malformed { path: show(path), reason: "it is no text" })?;
+        .map_err(|_| CurveKeyError::Malformed { path: show(path), reason: "it is not text" })?;
     Ok((Zeroizing::new(text.to_owned()), meta.permissions().mode()))
 }
 

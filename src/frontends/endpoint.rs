@@ -16,21 +16,21 @@ pub enum Endpoint {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum EndpointError {
     #[error(
-        "{endpoint:?} is no endpoint; expected tcp://ADDRESS:PORT, such as tcp://127.0.0.1:7117, or \
+        "{endpoint:?} is not an endpoint; expected tcp://ADDRESS:PORT, such as tcp://127.0.0.1:7117, or \
          ipc://PATH"
     )]
     Form { endpoint: String },
     #[error(
-        "{endpoint} would be open to the network, where anybody could come in as anybody; open it \
-         with keys (`--curve {endpoint}`), or listen on tcp://127.0.0.1:PORT"
+        "{endpoint} would be open to the network, where anyone could speak for every user; use keys \
+         (`--curve {endpoint}`), or listen on tcp://127.0.0.1:PORT"
     )]
     NotLoopback { endpoint: String },
     #[error(
-        "{endpoint} is beyond this machine, where only those with a key are let in; name yours with \
-         --key FILE and the service's with --server-key KEY"
+        "{endpoint} is on another machine, so you need keys; name your key with --key FILE and the \
+         service's key with --server-key KEY"
     )]
     KeyWanted { endpoint: String },
-    #[error("the path of {endpoint:?} has {found} bytes; a local socket's path has at most {max}")]
+    #[error("the path of {endpoint:?} has {found} bytes; the limit for a local socket is {max}")]
     PathTooLong { endpoint: String, found: usize, max: usize },
 }
 

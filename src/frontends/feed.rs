@@ -56,7 +56,7 @@ impl FeedMessage {
         let message: FeedMessage = wire::unpack(bytes)?;
         match message.v == wire::VERSION {
             true => Ok(message),
-            false => Err(format!("wire version {} is not spoken here", message.v)),
+            false => Err(format!("wire version {} is not supported", message.v)),
         }
     }
 }
@@ -359,7 +359,7 @@ impl Press {
                 let tenant = &stand.tenant;
                 tracing::warn!(
                     %tenant, %key, seconds = CUT_OFF_S,
-                    "a key subscribed to too many topics: it is cut off, and its feed opened anew"
+                    "a key subscribed to too many topics: it is blocked, and its feed is reopened"
                 );
                 watch.passes.cut_off(key);
                 stand.close();
@@ -402,7 +402,7 @@ impl Press {
         }
         let stand = self.stands.get_mut(tenant).expect("it was just looked for");
         if !ended.is_subset(&stand.ended) {
-            tracing::info!(%tenant, "a follower's key was taken back: its feed is opened anew");
+            tracing::info!(%tenant, "a follower's key was revoked: its feed is reopened");
             stand.close();
         }
         stand.ended = ended;

@@ -56,10 +56,10 @@ enum Kind {
 pub enum FollowError {
     #[error(transparent)]
     Client(#[from] ClientError),
-    #[error("the feed at {endpoint} cannot be listened to: {reason}")]
+    #[error("cannot connect to the feed at {endpoint}: {reason}")]
     Socket { endpoint: String, reason: String },
     /// The service shows another past than it showed before.
-    #[error("the log is not the one that was followed: {reason}")]
+    #[error("this is not the log that was followed before: {reason}")]
     Rewritten { reason: String },
 }
 
@@ -249,7 +249,7 @@ impl Follower {
         match self.positions.keys().find(|stream| !there(stream)) {
             None => Ok(()),
             Some(stream) => {
-                Err(FollowError::Rewritten { reason: format!("stream {stream} is gone") })
+                Err(FollowError::Rewritten { reason: format!("stream {stream} no longer exists") })
             }
         }
     }
@@ -330,12 +330,12 @@ impl Follower {
 }
 
 fn out_of_turn(stream: StreamKey, found: Seq, next: Seq) -> FollowError {
-    let reason = format!("stream {stream}: record {found} came where {next} is next");
+    let reason = format!("stream {stream}: expected record {next}, but record {found} came");
     FollowError::Rewritten { reason }
 }
 
 fn rewritten(stream: StreamKey, seq: Seq) -> FollowError {
-    let reason = format!("record {seq} of stream {stream} has another digest than before");
+    let reason = format!("the digest of record {seq} of stream {stream} changed");
     FollowError::Rewritten { reason }
 }
 

@@ -129,7 +129,7 @@ struct Guard<W: Fn()> {
 impl<W: Fn()> Drop for Guard<W> {
     fn drop(&mut self) {
         if !self.told {
-            self.failure.report("the thread that answers handshakes ended");
+            self.failure.report("the thread that authenticates new connections ended");
             (self.wake)();
         }
     }
@@ -153,7 +153,7 @@ impl Doorkeeper {
         socket
             .set_linger(0)
             .and_then(|()| socket.bind(ADDRESS))
-            .map_err(|error| format!("handshakes cannot be answered: {error}"))?;
+            .map_err(|error| format!("new connections cannot be authenticated: {error}"))?;
         let (bell, inbox) = Outbox::new().map_err(|error| error.to_string())?;
         let guard = Guard { failure: failure.clone(), wake, told: false };
         let mut desk = Desk { guard, socket, inbox, seal, admissions, passes, counters };
@@ -161,7 +161,8 @@ impl Doorkeeper {
             .name("doorkeeper".to_owned())
             .spawn(move || {
                 if let Err(error) = desk.serve() {
-                    failure.report(format!("handshakes cannot be answered any more: {error}"));
+                    failure
+                        .report(format!("new connections can no longer be authenticated: {error}"));
                 }
             })
             .map_err(|error| error.to_string())?;
@@ -232,7 +233,7 @@ impl<W: Fn()> Desk<W> {
                     _ => count(&self.counters.handshakes_denied),
                 }
                 // At debug level: a stranger must not be able to fill the operator's log.
-                tracing::debug!(code, text, "a connection was not let in");
+                tracing::debug!(code, text, "a connection was refused");
                 (code, text, String::new())
             }
         };

@@ -53,7 +53,7 @@ impl Difference {
                 Difference::new(*seq, "chunks", reason, "all chunks of the record, in order")
             }
             ReadError::Seal { seq, reason } => {
-                Difference::new(*seq, "seal", reason, "a seal that opens with this person's key")
+                Difference::new(*seq, "seal", reason, "a seal that opens with this user's key")
             }
             ReadError::Decode { seq, error } => {
                 Difference::new(*seq, "body", error, "an event that this binary can read")

@@ -23,11 +23,16 @@ pub(super) fn check(
         .signing_secret(tenant)
         .is_ok_and(|secret| evidence::is_signed(&secret, &statement, signature));
     if !signed {
-        return Some(Difference::new(seq, "signature", signature, "none of this tenant's key"));
+        return Some(Difference::new(
+            seq,
+            "signature",
+            signature,
+            "not a signature by this tenant's key",
+        ));
     }
     let stream = StreamId { tenant: tenant.clone(), key: *stream };
     if !matches!(store.log.read(&stream, *last).map(|_| ()), Err(ReadError::Erased)) {
-        return Some(Difference::new(seq, "key", "erased", "the person's key is there"));
+        return Some(Difference::new(seq, "key", "erased", "the user's key still exists"));
     }
     match store.log.walk(&stream) {
         Ok(Head { seq: found, digest }) if found == last.get() && digest == *head => None,

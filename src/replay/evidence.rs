@@ -71,7 +71,7 @@ pub fn leaves_of(registry: &Registry) -> Vec<TreeHash> {
 /// Where the records that a segment speaks for are not those it was closed over.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SegmentError {
-    #[error("its records end before it: {0}")]
+    #[error("some of its records are missing: {0}")]
     Missing(String),
     #[error("the root of its records is {found}")]
     Root { found: TreeHash },
@@ -107,7 +107,7 @@ pub fn check_segment(
         Some(found) if digests.len() as u64 == count => found,
         _ => {
             let there = digests.len();
-            return Err(SegmentError::Missing(format!("{there} of {count} are there")));
+            return Err(SegmentError::Missing(format!("{there} of {count} exist")));
         }
     };
     if found.head != segment.head {
@@ -136,13 +136,13 @@ pub enum CheckpointsError {
     #[error(
         "the log was rolled back: its newest checkpoint has {signed} segments, the log {found}; \
          restore the newer log, or, if it is lost, move the file of checkpoints away and tell \
-         whoever keeps checkpoints of this log"
+         everyone who keeps checkpoints of this log"
     )]
     RolledBack { signed: u64, found: u64 },
     #[error(
         "the log was forked: its first {signed} segments are not those of its newest checkpoint; \
          restore the log that was signed, or, if it is lost, move the file of checkpoints away and \
-         tell whoever keeps checkpoints of this log"
+         tell everyone who keeps checkpoints of this log"
     )]
     Forked { signed: u64 },
 }
@@ -179,7 +179,7 @@ pub fn newest_checkpoint(
 /// Why a proof cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProveError {
-    #[error("the stream has {last} records, there is no record {seq}")]
+    #[error("the stream has {last} records; there is no record {seq}")]
     Absent { seq: u64, last: u64 },
     #[error(
         "record {seq} is not yet covered: closed segments reach record {covered} of this stream; \
@@ -191,9 +191,9 @@ pub enum ProveError {
          checkpoint` signs one"
     )]
     NotSigned { seq: u64 },
-    #[error("the records are not those that the segment was closed over: {0}")]
+    #[error("the records changed after their segment was closed: {0}")]
     Segment(#[from] SegmentError),
-    #[error("the older checkpoint has {older} segments, the newest one only {newest}")]
+    #[error("the older checkpoint has {older} segments, but the newest one has only {newest}")]
     Older { older: u64, newest: u64 },
     #[error("the record cannot be revealed: {0}")]
     Sealed(ReadError),
@@ -201,7 +201,7 @@ pub enum ProveError {
     Key(#[from] KeyError),
     #[error(transparent)]
     Checkpoints(#[from] CheckpointsError),
-    #[error("no checkpoint was signed yet; `apprentice checkpoint` signs one")]
+    #[error("no checkpoint was signed yet; run `apprentice checkpoint`")]
     Unsigned,
 }
 

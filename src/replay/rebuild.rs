@@ -20,7 +20,7 @@ pub enum RebuildError {
          use a newer version of apprentice"
     )]
     Recipe { stream: StreamId, error: RecipeError },
-    #[error("stream {stream}: the mind of its records has digest {recorded}, but {recomputed}")]
+    #[error("stream {stream}: the recorded mind has digest {recorded}, but {recomputed}")]
     Mind { stream: StreamId, recorded: Digest, recomputed: String },
     #[error("stream {stream} has {have} records; there is no record {wanted}")]
     PastHead { stream: StreamId, have: u64, wanted: u64 },
@@ -188,7 +188,7 @@ pub fn mind_of<D: Domain>(
                     minds.note_not_reproduced();
                     let trained = trained.map(|mind| mind.digest().to_hex());
                     let trained = trained.unwrap_or_else(|error| error.to_string());
-                    tracing::warn!(%stream, %recorded, %trained, "a mind of other code is kept");
+                    tracing::warn!(%stream, %recorded, %trained, "a mind that another version trained is used");
                     kept
                 }
                 (trained, _) => {
@@ -201,7 +201,7 @@ pub fn mind_of<D: Domain>(
                 }
             };
             if let Err(reason) = origins::keep_mind(store, stream, &mind) {
-                tracing::warn!(%stream, %reason, "the mind's bytes were not kept");
+                tracing::warn!(%stream, %reason, "the mind was not saved in the cache");
             }
             mind
         }

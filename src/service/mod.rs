@@ -67,8 +67,8 @@ pub enum StartError {
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
     #[error(
-        "a feed lets in only those with a key, who catch up at a door with keys; open one, too \
-         (`--curve tcp://ADDRESS:PORT`)"
+        "a feed needs an endpoint with keys, where followers catch up; add one with \
+         `--curve tcp://ADDRESS:PORT`"
     )]
     FeedAlone,
     #[error(transparent)]

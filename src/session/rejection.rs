@@ -21,48 +21,48 @@ pub enum Rejection {
     StageText { what: &'static str, hidden: Hidden },
     #[error("in the reason, {0}")]
     Reason(Hidden),
-    #[error("the reason has {found} bytes; at most {UTTERANCE_BYTES_MAX} are recorded")]
+    #[error("the reason has {found} bytes; the limit is {UTTERANCE_BYTES_MAX}")]
     ReasonTooLong { found: usize },
     #[error("{command} is not possible {}; {}", phase_words(*phase), way_out(*phase))]
     WrongPhase { command: &'static str, phase: Phase },
     #[error("still learning from the last lessons; try again in a moment")]
     StillLearning,
-    #[error("the session was closed for good")]
+    #[error("this session is closed and cannot be opened again")]
     Closed,
     #[error("the session is already open")]
     AlreadyOpen,
-    #[error("nobody of this name was recorded: there is nothing to close")]
+    #[error("this person has no records, so there is no session to close")]
     NobodyThere,
     #[error("there is no utterance to teach at record {explains}; status lists what can be taught")]
     NothingToTeach { explains: Seq },
-    #[error("the utterance at record {explains} was explained already")]
+    #[error("the utterance at record {explains} was already taught or declined")]
     TaughtAlready { explains: Seq },
-    #[error("actions {actions:?} are no contiguous run; name a first and a last action")]
+    #[error("actions {actions:?} are not consecutive; name a first and a last action")]
     NotContiguous { actions: Vec<u32> },
-    #[error("actions {first}..{last} do not exist: this episode has {have}")]
+    #[error("you named actions {first}..{last}, but this episode has {have} actions")]
     NoSuchAction { first: u32, last: u32, have: u32 },
     #[error(
-        "action {first} came before \"{utterance}\" was said; choose from action {} on",
+        "action {first} came before you said \"{utterance}\"; start at action {} or later",
         before + 1
     )]
     NotAfter { first: u32, before: u32, utterance: String },
-    /// The same lifted form, or one that would swallow it, is taken by another program.
+    /// Another program already has this lifted form, or a form that covers it.
     #[error(
-        "\"{utterance}\" is already known as {known} ({}); {}",
+        "\"{utterance}\" already means {known} ({}); {}",
         whose(*lesson),
         clash_way_out(*lesson)
     )]
     Clash { utterance: LiftedUtterance, known: LiftedProgram, lesson: Option<Seq> },
-    #[error("there is no live lesson at record {lesson}")]
+    #[error("there is no lesson at record {lesson}, or it was already forgotten")]
     NoSuchLesson { lesson: Seq },
-    #[error("{LESSONS_MAX} lessons are kept at most; forget one first")]
+    #[error("you have {LESSONS_MAX} lessons, and the limit is {LESSONS_MAX}; forget one first")]
     TooManyLessons,
     #[error(
         "an episode has at most {EPISODE_UTTERANCES_MAX} utterances and {EPISODE_ACTIONS_MAX} \
          actions; say done and start another"
     )]
     EpisodeFull,
-    #[error("the scene has {found} bytes; at most {SCENE_FILE_BYTES_MAX} are read")]
+    #[error("the scene has {found} bytes; the limit is {SCENE_FILE_BYTES_MAX}")]
     SceneTooLarge { found: usize },
     #[error("no training is running for recipe {recipe}")]
     NoTraining { recipe: String },
@@ -70,7 +70,7 @@ pub enum Rejection {
     Recipe { reason: String },
     #[error(
         "request id {request} was used before, for the command {used_for:?} (record {first}); \
-         send this one under a new id"
+         send this command with a new id"
     )]
     RequestIdReused { request: RequestId, used_for: &'static str, first: Seq },
 }
@@ -112,7 +112,7 @@ impl Rejection {
             | Rejection::NotContiguous { .. }
             | Rejection::NoSuchAction { .. }
             | Rejection::NotAfter { .. } => RejectionCode::BadTeach,
-            // The code says that there is a choice; against a seed there is none.
+            // The code `clash` offers a choice. A seed offers none.
             Rejection::Clash { lesson: None, .. } => RejectionCode::BadTeach,
             Rejection::Clash { .. } => RejectionCode::Clash,
             Rejection::NoSuchLesson { .. } => RejectionCode::NoSuchLesson,
@@ -139,20 +139,20 @@ fn way_out(phase: Phase) -> &'static str {
         Phase::Interacting => "reach the goal or say done first",
         Phase::Teaching => "finish teaching first",
         Phase::Learning => "wait until it has learned",
-        Phase::Closed => "it is final",
+        Phase::Closed => "it cannot be opened again",
     }
 }
 
 fn whose(lesson: Option<Seq>) -> String {
     match lesson {
         Some(seq) => format!("your lesson at record {seq}"),
-        None => "one of the seeds".to_owned(),
+        None => "known from the start".to_owned(),
     }
 }
 
 fn clash_way_out(lesson: Option<Seq>) -> &'static str {
     match lesson {
         Some(_) => "replace it, keep both, or cancel",
-        None => "a seed stays: say it in other words",
+        None => "this cannot be changed, so teach other words",
     }
 }

@@ -81,7 +81,7 @@ pub(super) fn get(
     let entries = match cache.scan(&place.shelf, &place.key) {
         Ok(entries) => entries,
         Err(reason) => {
-            tracing::warn!(%stream, %reason, "a cache cannot be read and is taken as empty");
+            tracing::warn!(%stream, %reason, "a cache entry cannot be read and is ignored");
             return (None, true);
         }
     };

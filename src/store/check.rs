@@ -47,7 +47,7 @@ pub(super) fn log_before_opening(dir: &Path) -> Result<(), OpenError> {
     if Part::Log.is_as_closed(dir) {
         return Ok(());
     }
-    tracing::info!(dir = %dir.display(), "the log was not closed in order; a copy is checked first");
+    tracing::info!(dir = %dir.display(), "the log was not closed properly; a copy is checked first");
     let copy = Copy::make(dir, &["log", "HEADS"]).map_err(|error| OpenError::Io {
         dir: dir.display().to_string(),
         path: dir.join(COPY).display().to_string(),
@@ -67,7 +67,7 @@ pub(super) fn cache_before_opening(dir: &Path) {
         Err(error) => Err(error.to_string()),
     };
     if let Err(reason) = sound {
-        tracing::warn!(%reason, "the cache of minds and snapshots is damaged and starts afresh");
+        tracing::warn!(%reason, "the cache of minds and snapshots is damaged and is emptied");
         if let Err(error) = fs::remove_dir_all(&cache) {
             tracing::warn!(%error, "the damaged cache cannot be removed");
         }
@@ -104,7 +104,7 @@ fn remove_copy(dir: &Path) {
     if copy.exists()
         && let Err(error) = fs::remove_dir_all(&copy)
     {
-        tracing::warn!(copy = %copy.display(), %error, "a copy that was checked stays behind");
+        tracing::warn!(copy = %copy.display(), %error, "the checked copy could not be removed");
     }
 }
 

@@ -26,11 +26,11 @@ pub enum FeedError {
     Io { path: String, reason: String },
     #[error(
         "the checkpoints in {path} are damaged; restore the file from a backup, or move it away \
-         and tell whoever keeps checkpoints of this log"
+         and tell everyone who keeps checkpoints of this log"
     )]
     Damaged { path: String },
     #[error(
-        "this service is called {found} already, and its checkpoints say so; it cannot become {wanted}"
+        "this service is already called {found} in its checkpoints; it cannot be renamed to {wanted}"
     )]
     Origin { found: String, wanted: String },
     #[error("the checkpoints are open for reading only")]
@@ -282,7 +282,7 @@ mod tests {
         let fresh = tempfile::tempdir().unwrap();
         let other = CheckpointFeed::of(fresh.path(), true);
         let error = other.name("lab", Some("apprentice")).unwrap_err().to_string();
-        assert!(error.contains("called apprentice already"), "{error}");
+        assert!(error.contains("already called apprentice"), "{error}");
         let reader = CheckpointFeed::of(data.path(), false);
         assert_eq!(reader.append(&TenantId::local(), &note(1)), Err(FeedError::ReadOnly));
     }

@@ -118,7 +118,7 @@ impl Drop for ClosedMark {
             .and_then(|()| sync_dir(dir));
         if let Err(error) = marked {
             // Costs the next start a check and nothing else.
-            tracing::debug!(dir = %dir.display(), %error, "no mark of an orderly end was left");
+            tracing::debug!(dir = %dir.display(), %error, "the mark of a proper end was not written");
         }
     }
 }

@@ -120,7 +120,7 @@ impl PrivateCopy {
 impl Drop for PrivateCopy {
     fn drop(&mut self) {
         if let Err(error) = fs::remove_dir_all(&self.dir) {
-            tracing::warn!(dir = %self.dir.display(), %error, "a private copy stays behind");
+            tracing::warn!(dir = %self.dir.display(), %error, "the private copy could not be removed");
         }
     }
 }

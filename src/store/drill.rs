@@ -36,7 +36,7 @@ impl Store {
     ///
     /// - errors: the thread cannot be started.
     pub fn under(self, plan: FaultPlan) -> std::io::Result<Store> {
-        tracing::warn!(?plan, "FAULT DRILL: appends fail on purpose; this is no normal service");
+        tracing::warn!(?plan, "FAULT DRILL: writes fail on purpose; this is not a normal service");
         let every = Duration::from_millis(plan.release_every_ms);
         let faulty = Arc::new(FaultyLog::new(self.log.clone(), plan));
         let drill = Drill::start(faulty, every)?;

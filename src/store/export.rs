@@ -33,7 +33,7 @@ const HEAD_BYTES: usize = 4 + 1 + 4 + 4;
 /// More than any record or key file has.
 const PAYLOAD_BYTES_MAX: usize = RECORD_BYTES_MAX + 64 * 1024;
 
-const SHORT: &str = "the file ends before it does";
+const SHORT: &str = "the file ends in the middle of it";
 
 const TENANT: u8 = 1;
 const PERSON: u8 = 2;
@@ -55,15 +55,15 @@ pub enum ExportError {
     #[error("there are no records of tenant {tenant}")]
     Empty { tenant: TenantId },
     #[error(
-        "stream {}: lost: {}; an export is whole or not made: run `apprentice salvage` first and \
-         export what it saved", found.stream, found.losses[0]
+        "stream {}: lost: {}; nothing was exported: run `apprentice salvage` first, then export its \
+         result", found.stream, found.losses[0]
     )]
     Damaged { found: Box<StreamFound> },
     #[error("the heads file is damaged ({reason}); run `apprentice salvage` first")]
     Heads { reason: String },
     #[error("{path} cannot be written: {reason}")]
     Io { path: String, reason: String },
-    #[error("{path} is there already; name another file")]
+    #[error("{path} already exists; name another file")]
     Occupied { path: String },
 }
 
@@ -225,7 +225,7 @@ impl<R: Read> Reader<R> {
         let said = u32::from_be_bytes(*head[9..].first_chunk().expect("a head has 13 bytes"));
         let bytes = usize::try_from(u32::from_be_bytes(length)).unwrap_or(usize::MAX);
         if &head[..4] != MAGIC || bytes > PAYLOAD_BYTES_MAX {
-            return Err("it does not begin as a frame does".to_owned());
+            return Err("it does not begin like a frame".to_owned());
         }
         // What the length says is believed as far as there are bytes, and no memory is taken before.
         let mut payload = Vec::new();
@@ -235,14 +235,14 @@ impl<R: Read> Reader<R> {
         }
         let found = checksum(kind, length, &[&payload]);
         if found != said {
-            return Err(format!("its checksum is {found:08x}, it says {said:08x}"));
+            return Err(format!("its checksum is {found:08x}, but it says {said:08x}"));
         }
         if kind == END {
             return self.end(&payload);
         }
         self.hasher.update(&head);
         self.hasher.update(&payload);
-        frame_of(kind, payload).ok_or_else(|| "it says nothing that this version knows".to_owned())
+        frame_of(kind, payload).ok_or_else(|| "this version does not know its kind".to_owned())
     }
 
     fn fill(&mut self, bytes: &mut [u8]) -> Result<(), String> {
@@ -255,7 +255,7 @@ impl<R: Read> Reader<R> {
     fn end(&mut self, payload: &[u8]) -> Result<Frame, String> {
         let digest = *self.hasher.finalize().as_bytes();
         if payload != [&self.frames.to_be_bytes()[..], &digest].concat() {
-            return Err("the frames before it are not those that were written".to_owned());
+            return Err("the frames before it were changed".to_owned());
         }
         match self.input.read(&mut [0]) {
             Ok(0) => Ok(Frame::End),

@@ -31,12 +31,12 @@ pub enum ImportError {
     #[error("the key file {path} does not open this export: {reason}; nothing was imported")]
     Key { path: String, reason: String },
     #[error(
-        "the data directory {dir} has records or keys of tenant {tenant} already; choose another"
+        "the data directory {dir} already has records or keys of tenant {tenant}; choose another"
     )]
     Taken { dir: String, tenant: TenantId },
     #[error("{0}")]
     Open(#[from] OpenError),
-    #[error("tenant {tenant} could not be put into {dir}: {reason}; nothing was imported")]
+    #[error("tenant {tenant} could not be imported into {dir}: {reason}; nothing was imported")]
     Failed { dir: String, tenant: TenantId, reason: String },
 }
 
@@ -180,7 +180,7 @@ pub(super) fn settle(dir: &Path) -> Result<(), String> {
         .map_err(|error| format!("{} does not name a tenant: {error}", mark.display()))?;
     let mut adopter = Adopter::open(dir)?;
     if !adopter.holds(&tenant) {
-        tracing::warn!(%tenant, "an import that did not finish is taken back");
+        tracing::warn!(%tenant, "an unfinished import is undone");
         adopter.forget(&tenant)?;
         let secret = dir.join("keys").join(format!("{tenant}.key"));
         overwrite_and_remove(&secret).map_err(text)?;
@@ -198,7 +198,7 @@ pub(super) fn settle_before_opening(dir: &Path) -> Result<(), OpenError> {
     settle(dir).map_err(|reason| OpenError::Io {
         dir: dir.display().to_string(),
         path: dir.join(MARK).display().to_string(),
-        reason: format!("an import that did not finish cannot be taken back: {reason}"),
+        reason: format!("an unfinished import cannot be undone: {reason}"),
     })
 }
 

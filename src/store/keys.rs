@@ -22,7 +22,7 @@ const STREAM_KEYS: &str = "apprentice 1: stream keys";
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum KeyError {
     #[error(
-        "tenant {tenant} has no key file {path}; restore it from a backup, or make the tenant first"
+        "tenant {tenant} has no key file {path}; restore it from a backup, or add the tenant first"
     )]
     NoTenant { tenant: TenantId, path: String },
     #[error("the key file {path} can be read by others (mode {mode:03o}); run: chmod 600 {path}")]
@@ -31,16 +31,16 @@ pub enum KeyError {
     Malformed { path: String, reason: String },
     #[error("the key of stream {stream} is missing: {path}; restore it from a backup")]
     Missing { stream: StreamId, path: String },
-    #[error("the person behind stream {stream} was erased")]
+    #[error("the user of stream {stream} was erased")]
     Erased { stream: StreamId },
     #[error(
         "tenant {tenant} has one secret in the environment variable {variable} and another in the \
-         file {path}; keep the one that its records were sealed with"
+         file {path}; keep the one that sealed its records"
     )]
     TwoSecrets { tenant: TenantId, variable: String, path: String },
     #[error(
-        "the secret of tenant {tenant} in {place} opens the key of nobody in this directory; give \
-         the one that its records were sealed with"
+        "the secret of tenant {tenant} in {place} opens no user's key in this directory; give the \
+         secret that sealed its records"
     )]
     WrongSecret { tenant: TenantId, place: String },
     #[error("the keys are open for reading only")]
@@ -130,7 +130,7 @@ impl Keys {
         path: &Path,
         entropy: Arc<dyn Entropy>,
     ) -> Result<Keys, KeyError> {
-        let text = std::str::from_utf8(secret).map_err(|_| malformed(path, "it is no text"))?;
+        let text = std::str::from_utf8(secret).map_err(|_| malformed(path, "it is not text"))?;
         let keys = Keys::in_memory(entropy);
         keys.held().tenants.insert(tenant.clone(), tenant_key_of(text, path)?);
         Ok(keys)
@@ -510,7 +510,7 @@ fn read_tenant_key(path: &Path, tenant: &TenantId) -> Result<DataKey, KeyError> 
             return Err(KeyError::NoTenant { tenant: tenant.clone(), path: show(path) });
         }
         Err(error) if error.kind() == io::ErrorKind::InvalidData => {
-            return Err(malformed(path, "it is no text"));
+            return Err(malformed(path, "it is not text"));
         }
         Err(error) => return Err(cannot(path, &error)),
     };

@@ -108,7 +108,7 @@ pub(super) fn bring_up(
             dir = %former.dir.display(),
             from = number,
             to = number + 1,
-            "the data directory is brought up to a newer layout"
+            "the data directory is upgraded to a newer layout"
         );
         match number {
             1 => former.copy_minds(),
@@ -145,7 +145,7 @@ impl Former<'_> {
             }
         }
         if let Err(reason) = self.cache.flush() {
-            tracing::warn!(%reason, "the copied minds may be lost and trained again");
+            tracing::warn!(%reason, "the copied minds may be lost; they are then trained again");
         }
         tracing::info!(copied, left, "kept minds were copied");
     }
@@ -163,7 +163,7 @@ impl Former<'_> {
 pub(super) fn clear_former(cache: &SledCache) {
     for begin in [layout_1::MINDS, layout_1::SNAPSHOTS] {
         if let Err(reason) = cache.drop_shelves(begin) {
-            tracing::warn!(%reason, "what a former layout kept stays behind");
+            tracing::warn!(%reason, "the files of the older layout could not be removed");
         }
     }
 }

@@ -103,21 +103,21 @@ const RETRY_APPEND_MS: u32 = 100;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AppendError {
     #[error(
-        "stream {stream}: expected head {expected}, found {found}; another writer holds this user"
+        "stream {stream}: expected head {expected}, found {found}; another writer added records"
     )]
     Conflict { stream: StreamId, expected: u64, found: u64 },
     /// Retry later: nothing was appended.
     #[error("the log is busy: {waiting} batches are waiting; try again")]
     Busy { waiting: usize },
     /// The log stopped after an I/O error; only a restart helps. The batch may or may not be there.
-    #[error("the log is poisoned and acknowledges nothing until it is restarted: {reason}")]
+    #[error("the log is poisoned and acknowledges nothing until you restart the service: {reason}")]
     Poisoned { reason: String },
     #[error("the batch is too large: {reason}")]
     TooLarge { reason: String },
-    #[error("the person behind this stream was erased")]
+    #[error("the user of this stream was erased")]
     Erased,
     /// Nothing was appended: the body cannot be sealed.
-    #[error("nothing can be sealed for this stream: {reason}")]
+    #[error("no record of this stream can be sealed: {reason}")]
     Key { reason: String },
     /// The committer is gone; the batch may or may not be there.
     #[error("the log was closed before it answered")]
@@ -154,17 +154,17 @@ impl AppendError {
 pub enum ReadError {
     #[error("record {seq}: {error}")]
     Header { seq: u64, error: HeaderError },
-    #[error("record {seq}: it names {found} as its predecessor, which is {expected}")]
+    #[error("record {seq}: its predecessor is {expected}, but it names {found}")]
     Chain { seq: u64, expected: String, found: String },
     #[error("expected record {expected}, found {found}: records are missing")]
     Gap { expected: u64, found: u64 },
     #[error("record {seq}: its chunks are incomplete: {reason}")]
     Chunks { seq: u64, reason: String },
-    #[error("record {seq} cannot be opened with this user's key: {reason}")]
+    #[error("record {seq} cannot be decrypted with this user's key: {reason}")]
     Seal { seq: u64, reason: String },
     #[error("record {seq}: {error}")]
     Decode { seq: u64, error: DecodeError },
-    #[error("the person behind this stream was erased")]
+    #[error("the user of this stream was erased")]
     Erased,
     #[error("the store cannot be read: {reason}")]
     Store { reason: String },

@@ -54,7 +54,7 @@ impl ModelStore {
                 tracing::warn!(%stream, %digest, "a kept mind is damaged and is trained again");
             }
             Found::Stale(_) => {
-                tracing::info!(%stream, %digest, "a kept mind is of other code and is trained again");
+                tracing::info!(%stream, %digest, "a kept mind is of another version and is trained again");
             }
             Found::Absent | Found::Fits(_) => {}
         }

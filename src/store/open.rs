@@ -51,12 +51,12 @@ pub enum OpenError {
     NotOurs { dir: String, found: String },
     #[error(
         "there is no data directory of apprentice at {dir}: {found}; \
-         name the one that people's data was kept in"
+         name the right one"
     )]
     Absent { dir: String, found: &'static str },
     #[error(
-        "the data directory {dir} has layout {found}, this version of apprentice knows layouts up \
-         to {LAYOUT}; use the version that wrote it or a newer one, or the backup made before that"
+        "the data directory {dir} has layout {found}, but this version of apprentice knows layouts \
+         up to {LAYOUT}; use the version that wrote it or a newer one, or an older backup"
     )]
     Newer { dir: String, found: u32 },
     #[error("the file LAYOUT of the data directory {dir} is damaged; restore it from a backup")]
@@ -191,7 +191,7 @@ impl Store {
         self.keys.erase_user_key(stream)?;
         for dropped in [self.models.keep_only(stream, &[]), self.snapshots.forget(stream)] {
             if let Err(reason) = dropped {
-                tracing::warn!(%stream, %reason, "an erased person's cache is left as noise");
+                tracing::warn!(%stream, %reason, "the cache of an erased user, which nothing can decrypt, could not be removed");
             }
         }
         let typed = self.directory.as_ref().filter(|_| stream.tenant == TenantId::local());

@@ -43,7 +43,7 @@ pub struct Share {
 pub enum SalvageError {
     #[error(transparent)]
     Source(#[from] RescueError),
-    #[error("{out} is there already and is not empty; name a directory that does not exist")]
+    #[error("{out} already exists and is not empty; name a directory that does not exist")]
     Occupied { out: String },
     #[error("{out} cannot be made: {reason}")]
     Out { out: String, reason: String },

@@ -72,12 +72,12 @@ impl DataKey {
         let wrong = |reason: &str| ReadError::Seal { seq, reason: reason.to_owned() };
         let plain = self
             .open(&bound_bytes(header), sealed)
-            .ok_or_else(|| wrong("the seal does not fit the key, the header or the bytes"))?;
+            .ok_or_else(|| wrong("the seal does not match the key, the header or the bytes"))?;
         let (salt, body) = plain
             .split_first_chunk::<SALT_BYTES>()
             .ok_or_else(|| wrong("the sealed text is shorter than its salt"))?;
         if commitment(salt, body) != header.commitment {
-            return Err(wrong("the body is not the one that the header commits to"));
+            return Err(wrong("the body does not match the commitment in the header"));
         }
         Ok((*salt, body.to_vec()))
     }
@@ -99,7 +99,7 @@ impl Draft {
         let too_large = |reason| Err(AppendError::TooLarge { reason });
         let found = batch.events.len();
         if found > BATCH_EVENTS_MAX {
-            return too_large(format!("{found} events; at most {BATCH_EVENTS_MAX} are allowed"));
+            return too_large(format!("{found} events; the limit is {BATCH_EVENTS_MAX}"));
         }
         let mut events = Vec::with_capacity(found);
         let mut bytes = 0;
@@ -108,14 +108,14 @@ impl Draft {
             if body.len() > RECORD_BYTES_MAX {
                 let (kind, found) = (event.kind(), body.len());
                 return too_large(format!(
-                    "a {kind:?} event has {found} bytes; at most {RECORD_BYTES_MAX} are allowed"
+                    "a {kind:?} event has {found} bytes; the limit is {RECORD_BYTES_MAX}"
                 ));
             }
             bytes += body.len();
             events.push((event, body));
         }
         if bytes > BATCH_BYTES_MAX {
-            return too_large(format!("{bytes} bytes; at most {BATCH_BYTES_MAX} are allowed"));
+            return too_large(format!("{bytes} bytes; the limit is {BATCH_BYTES_MAX}"));
         }
         Ok(Draft { request: batch.request, at: batch.at, events, bytes })
     }
@@ -224,7 +224,7 @@ impl Walk {
             return Err(ReadError::Gap { expected: seq, found: header.seq.get() });
         }
         if header.stream != self.stream {
-            let reason = format!("it says it belongs to stream {}", header.stream);
+            let reason = format!("it belongs to stream {}", header.stream);
             return Err(ReadError::Seal { seq, reason });
         }
         if header.prev != self.last.digest {

@@ -99,7 +99,7 @@ struct WaitingRooms {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Damage {
     #[error(
-        "stream {stream}: {acknowledged} records were acknowledged, only {found} are there; \
+        "stream {stream}: {acknowledged} records were acknowledged, but only {found} exist; \
          the last {} are lost", acknowledged - found
     )]
     LostTail { stream: StreamId, acknowledged: u64, found: u64 },
@@ -375,7 +375,7 @@ impl Waiting {
 impl Shared {
     /// The first reason counts; the log stays poisoned until it is opened anew.
     fn poison(&self, reason: String) {
-        tracing::error!(%reason, "the log is poisoned: nothing is acknowledged any more");
+        tracing::error!(%reason, "the log is poisoned: nothing is acknowledged until you restart the service");
         let _ = self.poisoned.set(reason);
     }
 

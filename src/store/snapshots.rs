@@ -68,7 +68,7 @@ impl SnapshotStore {
                 None
             }
             Found::Stale(_) => {
-                tracing::info!(%stream, "a snapshot fits another code or log and is not used");
+                tracing::info!(%stream, "a snapshot is of another version or log and is not used");
                 None
             }
             Found::Absent => None,

@@ -228,7 +228,7 @@ fn check_step(step: &Step) -> Result<(), String> {
     let operator = known.iter().find(|(name, _)| step.operator == **name);
     let Some((name, takes)) = operator else {
         let names = known.map(|(name, _)| name).join(", ");
-        return Err(format!("{} is no action; actions are {names}", step.operator));
+        return Err(format!("{} is not an action; actions are {names}", step.operator));
     };
     if step.args.len() != *takes {
         let found = step.args.len();

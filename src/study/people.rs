@@ -49,7 +49,7 @@ impl FromStr for People {
             "choosing" => Ok(People::Choosing),
             "held-out" => Ok(People::HeldOut),
             "all" => Ok(People::All),
-            other => Err(format!("{other:?} is none of {}", People::NAMES.join(", "))),
+            other => Err(format!("{other:?} is not one of {}", People::NAMES.join(", "))),
         }
     }
 }

@@ -12,30 +12,32 @@ use crate::plain::{self, Hidden};
 pub enum Refusal {
     #[error("the tenant does not exist yet; add it first")]
     NotOpen,
-    #[error("key {key} is already here as {held}; admit another key as {wanted}")]
+    #[error("key {key} is already admitted as {held}; admit another key as {wanted}")]
     OtherRole { key: PublicKey, held: Role, wanted: Role },
-    #[error("key {key} was retired, and a retired key never comes back; make a new one")]
+    #[error("key {key} is retired and cannot be admitted again; make a new key")]
     Retired { key: PublicKey },
-    #[error("key {key} is not among this tenant's; `tenant list` shows them")]
+    #[error("key {key} does not belong to this tenant; `apprentice tenant list` shows its keys")]
     UnknownKey { key: PublicKey },
-    #[error("a key cannot be replaced by itself: {key}")]
+    #[error("the old and the new key are the same: {key}")]
     SameKey { key: PublicKey },
     #[error(
-        "an overlap has at most {max} seconds ({} days), this one has {found}; give a shorter one",
+        "an overlap has at most {max} seconds ({} days), but this one has {found}; give a shorter one",
         max / 86_400
     )]
     TooLongOverlap { max: u64, found: u64 },
-    #[error("a tenant has at most {max} keys; retired ones count, because they are remembered")]
+    #[error("this tenant already has {max} keys, which is the limit; retired keys count too")]
     TooManyKeys { max: usize },
-    #[error("a {what} has at most {max} bytes, this one has {found}")]
+    #[error("a {what} has at most {max} bytes, but this one has {found}")]
     TooLong { what: &'static str, max: usize, found: usize },
     #[error("in the {what}, {hidden}")]
     Hidden { what: &'static str, hidden: Hidden },
-    #[error("a quota of 0 {what} would let nobody in; disable the tenant instead")]
+    #[error("a quota of 0 {what} would block everyone; disable the tenant instead")]
     NothingAllowed { what: &'static str },
-    #[error("the segment begins at record {found}, but {wanted} is the first that none covers")]
+    #[error(
+        "the segment begins at record {found}, but the first record without a segment is {wanted}"
+    )]
     Segment { wanted: Seq, found: Seq },
-    #[error("stream {stream} is the tenant's own, and nobody's life")]
+    #[error("stream {stream} is the tenant's own stream, not a user's")]
     TenantsOwn { stream: StreamKey },
 }
 
@@ -312,11 +314,11 @@ mod tests {
         obey(&mut registry, admit_a(), 1).unwrap();
         let mut refused = |order| obey(&mut registry, order, 2).unwrap_err().to_string();
         let auditor = Order::Admit { key: A, role: Role::Auditor, label: String::new() };
-        assert!(refused(auditor).contains("already here as gateway"));
+        assert!(refused(auditor).contains("already admitted as gateway"));
         let unknown = Order::Retire { key: B, overlap_seconds: 0 };
-        assert!(refused(unknown).contains("not among this tenant's"));
+        assert!(refused(unknown).contains("does not belong to this tenant"));
         let same = Order::Rotate { old: A, new: A, overlap_seconds: 0 };
-        assert!(refused(same).contains("by itself"));
+        assert!(refused(same).contains("are the same"));
         let long = Order::Disable { reason: "x".repeat(LABEL_BYTES_MAX + 1) };
         assert!(refused(long).contains("at most"));
         let forged = Order::Disable { reason: "unpaid\nlab: enabled".to_owned() };

@@ -92,13 +92,13 @@ impl Registry {
         let seq = record.seq;
         let wrong = |reason: String| Err(Disagreement { seq, reason });
         if seq != self.head.next() || record.prev != self.head.digest {
-            return wrong(format!("it does not follow on record {}", self.head.seq));
+            return wrong(format!("it does not follow record {}", self.head.seq));
         }
         let Event::Tenant(event) = &record.event else {
-            return wrong(format!("{:?} is of a person's life", record.event.kind()));
+            return wrong(format!("a {:?} belongs in a user's stream", record.event.kind()));
         };
         if matches!(event, TenantEvent::Opened(_)) == self.opened {
-            return wrong("a tenant is opened once, and first".to_owned());
+            return wrong("the first record, and only the first, must open the tenant".to_owned());
         }
         // A held time is no reading of a clock. (The other records of a batch have the time of its
         // first one, which was observed.)
@@ -134,7 +134,7 @@ impl Registry {
                 let next = self.uncovered(event.stream);
                 if event.first != next || event.last < event.first {
                     return wrong(format!(
-                        "a segment of records {} to {} cannot follow where {next} is next",
+                        "a segment of records {} to {} cannot follow; the next record is {next}",
                         event.first, event.last
                     ));
                 }

@@ -70,7 +70,7 @@ fn a_stage_whose_goal_holds_is_refused_in_one_sentence() {
         (
             "place Mug CounterTop",
             Some(
-                "the goal holds already: put a mug on the counter top; \
+                "the goal is already reached: put a mug on the counter top; \
             change the scene or name another task",
             ),
         ),

@@ -162,7 +162,7 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
     let mut counts = counts.lock().unwrap();
     counts.failed += usize::from(what.is_some());
     counts.not_reached += usize::from(what.is_none());
-    let hung = |ended: &Ended| ended.errors.contains("has not taken a record within");
+    let hung = |ended: &Ended| ended.errors.contains("did not store a record within");
     counts.hung += usize::from(matches!(&ending, Ending::Gone(ended) if hung(ended)));
     match ending {
         Ending::Gone(_) if promised.is_empty() => counts.at_start += 1,

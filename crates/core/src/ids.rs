@@ -20,17 +20,20 @@ use crate::plain::{self, Hidden};
 pub enum IdError {
     #[error("a {what} must not be empty")]
     Empty { what: &'static str },
-    #[error("a {what} has at most {max} bytes, this one has {found}")]
+    #[error("a {what} has at most {max} bytes, but this one has {found}")]
     TooLong { what: &'static str, max: usize, found: usize },
     #[error("a {what} may not contain {found:?}; allowed are {allowed}")]
     Character { what: &'static str, found: char, allowed: &'static str },
     #[error("a {what}: {hidden}")]
     Hidden { what: &'static str, hidden: Hidden },
-    #[error("character {place} of a {what} is {found:?}; blanks stand inside it only, as U+0020")]
+    #[error(
+        "character {place} of a {what} is {found:?}; the only blanks allowed are spaces (U+0020) \
+         between words"
+    )]
     Blank { what: &'static str, found: char, place: usize },
-    #[error("a {what} may not begin with '-': a command would take it for an option")]
+    #[error("a {what} may not begin with '-': a command would read it as an option")]
     Option { what: &'static str },
-    #[error("{found:?} is no {what}: expected {expected}")]
+    #[error("{found:?} is not a {what}: expected {expected}")]
     Form { what: &'static str, found: String, expected: &'static str },
 }
 

@@ -26,6 +26,7 @@ mod scene_text;
 mod state_words;
 mod task;
 mod task_goal;
+pub mod told;
 mod view;
 mod words;
 

@@ -61,7 +61,7 @@ pub(super) fn read(text: &str) -> Result<Scene, StageError> {
     };
     if text.len() > SCENE_FILE_BYTES_MAX {
         let found = text.len();
-        let reason = format!("it has {found} bytes; at most {SCENE_FILE_BYTES_MAX} are read");
+        let reason = format!("it has {found} bytes; the limit is {SCENE_FILE_BYTES_MAX}");
         return Err(error(0, reason));
     }
     let file: SceneFile = toml::from_str(text).map_err(|e| {
@@ -70,7 +70,7 @@ pub(super) fn read(text: &str) -> Result<Scene, StageError> {
     let at = |place: &Spanned<String>, reason: String| error(place.span().start, reason);
     let room = Room::read(file.room.get_ref()).ok_or_else(|| {
         let known = Room::ALL.map(Room::key).join(", ");
-        at(&file.room, format!("{:?} is no room; expected one of {known}", file.room.get_ref()))
+        at(&file.room, format!("{:?} is not a room; expected one of {known}", file.room.get_ref()))
     })?;
     let mut builder = SceneBuilder::new(room);
     let held = match &file.holds {
@@ -85,7 +85,7 @@ pub(super) fn read(text: &str) -> Result<Scene, StageError> {
             }
             (Some(name), None) | (None, Some(name)) => {
                 if let Some(spot) = &thing.at {
-                    let reason = "a thing in or on another is where that is; leave out `at`";
+                    let reason = "a thing in or on another one has the same place; leave out `at`";
                     return Err(error(spot.span().start, reason.to_owned()));
                 }
                 let place = find(&builder, name.get_ref()).map_err(|r| at(name, r))?;
@@ -131,7 +131,7 @@ fn set_state(
             Some(state) => (state, true),
             None => {
                 return Err(format!(
-                    "{word:?} is no state; expected open, closed, on, off, dirty, clean, hot or cold"
+                    "{word:?} is not a state; expected open, closed, on, off, dirty, clean, hot or cold"
                 ));
             }
         },
@@ -148,7 +148,7 @@ fn find(builder: &SceneBuilder, name: &str) -> Result<ObjectId, String> {
     let (kind, number) = split_name(name)?;
     match scene.of(kind).nth(number - 1) {
         Some(index) => Ok(ObjectId(index)),
-        None => Err(format!("there is no {name:?} among the things further up")),
+        None => Err(format!("there is no {name:?} among the things above it")),
     }
 }
 
@@ -173,7 +173,11 @@ fn split_name(name: &str) -> Result<(Kind, usize), String> {
         None => (name.trim(), 1),
         Some((kind, number)) => match number.parse::<Index>() {
             Ok(number) if number >= 1 => (kind, usize::from(number)),
-            _ => return Err(format!("{name:?} is no name of a thing, such as Mug or \"Mug 2\"")),
+            _ => {
+                return Err(format!(
+                    "{name:?} is not the name of a thing, such as Mug or \"Mug 2\""
+                ));
+            }
         },
     };
     Ok((facts().find(kind)?, number))

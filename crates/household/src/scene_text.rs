@@ -77,7 +77,7 @@ impl<'de> Deserialize<'de> for Scene {
 
 fn read(text: SceneText) -> Result<Scene, String> {
     let room = Room::read(&text.room)
-        .ok_or_else(|| format!("{:?} is no room of a household", text.room))?;
+        .ok_or_else(|| format!("{:?} is not a room of a household", text.room))?;
     if text.things.len() > SCENE_OBJECTS_MAX {
         return Err(format!(
             "the scene has {} things; at most {SCENE_OBJECTS_MAX} are allowed",

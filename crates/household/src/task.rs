@@ -109,7 +109,10 @@ impl Task {
         let stays = |place: Kind| match place.pickupable() {
             true => {
                 let place = place.name();
-                Err(format!("{} is carried about; use nested THING {place} PLACE", a(place)))
+                Err(format!(
+                    "{} can be carried, so it is not a place; use nested THING {place} PLACE",
+                    a(place)
+                ))
             }
             false => Ok(()),
         };
@@ -118,7 +121,9 @@ impl Task {
             false => Err(format!("{} cannot be {what}", a(thing.name()))),
         };
         let elsewhere = |place: Kind, appliance: Kind| match place == appliance {
-            true => Err(format!("the thing is in the {place} anyway then; name another place")),
+            true => {
+                Err(format!("this task already puts the thing in the {place}; name another place"))
+            }
             false => Ok(()),
         };
         let facts = facts();
@@ -161,7 +166,7 @@ impl Task {
                 carried(thing)?;
                 match light.light() {
                     true => Ok(()),
-                    false => Err(format!("{} is no lamp", a(light.name()))),
+                    false => Err(format!("{} is not a lamp", a(light.name()))),
                 }
             }
         }
@@ -242,11 +247,14 @@ impl FromStr for Task {
                 let known = ["place", "two", "nested", "clean", "heat", "cool", "look", "free"];
                 let near = nearest_word(other, known.into_iter()).expect("there are forms");
                 let other: String = other.chars().take(40).collect();
-                return Err(format!("{other:?} is no form of task; the nearest is {near}"));
+                return Err(format!("{other:?} is not a form of task; the nearest is {near}"));
             }
         };
         if rest.len() != count {
-            return Err(format!("{form} takes {count} things, this has {}", rest.len()));
+            return Err(format!(
+                "{form} takes {count} names of things, but you gave {}",
+                rest.len()
+            ));
         }
         let kinds: Vec<Kind> =
             rest.iter().map(|name| facts().find(name)).collect::<Result<_, _>>()?;
@@ -268,7 +276,7 @@ impl FromStr for Task {
 
 fn read_free(rest: &[&str], closed: bool) -> Result<Task, String> {
     if closed {
-        return Err("free has no goal that could want closed doors".to_owned());
+        return Err("free has no goal, so it cannot end in closed".to_owned());
     }
     let name = rest.join(" ");
     match (name.is_empty(), Room::read(&name)) {
@@ -277,7 +285,7 @@ fn read_free(rest: &[&str], closed: bool) -> Result<Task, String> {
         (false, None) => {
             let known = Room::ALL.map(Room::key).join(", ");
             let name: String = name.chars().take(40).collect();
-            Err(format!("{name:?} is no room; rooms are {known}"))
+            Err(format!("{name:?} is not a room; the rooms are {known}"))
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The event log, for people and programs to read.
+//! Prints the event log, for people and for programs.
 
 mod show;
 
@@ -14,18 +14,18 @@ use super::shown;
 use crate::events::Times;
 use crate::ids::Seq;
 
-/// Read what was recorded.
+/// Print the records of a user.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   apprentice log show --user you
   apprentice log show --data lab --user ada --json | jq .event.goal
 
-A time is held where the wall clock read no later than the record before it: times never run backwards,
-and the line below such a time says so.
+Recorded times never go backwards. If the wall clock did not move forward after the previous record, the
+time is held, and a line below it says so.
 
-Exit codes: 1 a record cannot be read (those before it are printed), 2 the directory cannot be used
-or has no such person.")]
+Exit codes: 1 a record cannot be read (the records before it are printed); 2 the directory cannot be
+used or has no such user.")]
 pub struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -33,7 +33,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Print one person's records, oldest first.
+    /// Print one user's records, oldest first.
     Show(Show),
 }
 
@@ -41,7 +41,7 @@ enum Verb {
 struct Show {
     #[command(flatten)]
     whose: Whose,
-    /// One JSON object per record, with everything in it and without times.
+    /// Print one JSON object per record, complete but without times.
     #[arg(long)]
     json: bool,
 }

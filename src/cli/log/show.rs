@@ -12,12 +12,12 @@ pub fn json(record: &Record) -> Value {
     json!({ "seq": record.seq.get(), "kind": kind, "event": replay::body(&record.event) })
 }
 
-/// Below a time that was held.
-const HELD: &str = "time held: the clock read no later than the record before";
+/// Shown below a held time.
+const HELD: &str = "time held: the clock did not move forward";
 
 /// One record for a person: number, time (UTC), kind, and what it says.
 ///
-/// - `held`: its time is not what the wall clock read ([`crate::events::Times`]).
+/// - `held`: whether its time is later than what the wall clock showed ([`crate::events::Times`]).
 pub fn readable(record: &Record, held: bool) -> Vec<String> {
     let (first, more) = sentences(&record.event);
     let kind = format!("{:?}", record.event.kind());
@@ -42,8 +42,7 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
             )],
         ),
         Event::EpisodeStarted(event) => {
-            let drawn =
-                event.seed.map_or("a given scene".to_owned(), |seed| format!("seed {seed}"));
+            let drawn = event.seed.map_or("a scene file".to_owned(), |seed| format!("seed {seed}"));
             let fewest = event.fewest.map_or(String::new(), |n| format!(", fewest actions {n}"));
             (event.goal.clone(), vec![format!("{drawn}{fewest}")])
         }
@@ -112,14 +111,14 @@ fn tenants(event: &TenantEvent) -> String {
             let (key, overlap) = (event.key, event.overlap);
             match overlap {
                 Overlap::Read { wall, overlap_seconds: 0 } => {
-                    format!("{key}, for good; the clock read {}", utc(wall))
+                    format!("{key}, now; the clock showed {}", utc(wall))
                 }
                 Overlap::Read { wall, overlap_seconds } => {
                     let wall = utc(wall);
-                    format!("{key}, good for {overlap_seconds} s more; the clock read {wall}")
+                    format!("{key}, after {overlap_seconds} s more; the clock showed {wall}")
                 }
                 Overlap::Former { valid_until } => {
-                    format!("{key}, good until {}", utc(valid_until))
+                    format!("{key}, at {}", utc(valid_until))
                 }
             }
         }

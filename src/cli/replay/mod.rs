@@ -15,11 +15,11 @@ use crate::ids::Seq;
 use crate::replay::{self, Minds};
 use crate::world::household::Household;
 
-/// Rebuild a person's session as it stood at any moment.
+/// Rebuild a user's session as it was after any record.
 ///
-/// The records are folded as when the person wakes, every checksum, chain and scene digest checked
-/// on the way, and the mind of that moment is trained again unless it is cached. The directory is
-/// copied first and stays as it is.
+/// Applies the records in order and checks every checksum, the chain and every scene digest. If the
+/// mind of that time is not in the cache, it is trained again. The command works on a copy and does
+/// not change the directory.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -29,18 +29,18 @@ Examples:
 
 docs/replay.md says what each digest covers.
 
-Exit codes: 0 the session was rebuilt; 1 the log and this program do not agree, and where; 2 the
-directory cannot be used, has no such tenant or user, or no such record.")]
+Exit codes: 0 the session was rebuilt; 1 the log and this program disagree (the message says where); 2
+the directory cannot be used, or has no such tenant, user or record.")]
 pub struct Arguments {
     #[command(flatten)]
     whose: Whose,
-    /// Just after this record; the last one without it. `apprentice log show` numbers them.
+    /// Stop after this record [default: the last one]. `apprentice log show` prints the numbers.
     #[arg(long, value_name = "SEQ")]
     at: Option<u64>,
-    /// The history up to there in the notation of docs/transcripts.md.
+    /// Print the history up to there in the notation of docs/transcripts.md.
     #[arg(long, conflicts_with = "json")]
     transcript: bool,
-    /// One JSON object with the whole state, without times and request ids.
+    /// Print one JSON object with the whole state, without times and request ids.
     #[arg(long)]
     json: bool,
 }
@@ -51,8 +51,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let wanted = arguments.at.unwrap_or(head);
     let at = Seq::new(wanted).filter(|at| at.get() <= head).ok_or_else(|| {
         Failure::bad_input(format!(
-            "user {:?} in tenant {tenant} has records 1 to {head}, there is no record {wanted}; \
-             name one of them with --at",
+            "user {:?} in tenant {tenant} has records 1 to {head}; there is no record {wanted}; \
+             choose one of them with --at",
             user.as_str()
         ))
     })?;

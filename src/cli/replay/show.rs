@@ -40,7 +40,7 @@ pub fn readable<D: Domain>(tenant: &TenantId, session: &Session<D>, head: u64) -
         format!("state   {}", session.state_digest()),
         format!("mind    {}", status.mind),
         format!(
-            "recipe {} {}, {}: {} of this person's own",
+            "recipe {} {}, {}: {} taught by this user",
             recipe.name(),
             recipe.digest().short(),
             count(status.exemplars, "example"),

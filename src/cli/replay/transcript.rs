@@ -97,7 +97,7 @@ impl<D: Domain> History<D> {
                     let said = plain::escape(&utterance);
                     say!(
                         out,
-                        "# Said at record {seq}, with � for what is no plain character: {said}"
+                        "# Said at record {seq}, with � in place of each special character: {said}"
                     )?;
                 }
                 say!(out, "> {}", plain::replace(&utterance))?;
@@ -156,7 +156,10 @@ impl<D: Domain> History<D> {
             other.seq > explains && plain::replace(other_words) == plain::replace(words)
         });
         if later {
-            say!(out, "# This was about an earlier one of the same words, at record {explains}.")?;
+            say!(
+                out,
+                "# This taught the earlier utterance with the same words, at record {explains}."
+            )?;
         }
         let quoted = quoted(&plain::replace(this.utterance.as_str()));
         let (Some(first), Some(last)) = (actions.first(), actions.last()) else {
@@ -180,7 +183,7 @@ impl<D: Domain> History<D> {
         if live.iter().any(|other| {
             other.seq > lesson && plain::replace(other.lesson.utterance.as_str()) == words
         }) {
-            say!(out, "# This was about an earlier lesson of the same words, at record {lesson}.")?;
+            say!(out, "# This forgot the earlier lesson with the same words, at record {lesson}.")?;
         }
         say!(out, "forget {}", quoted(&words))
     }
@@ -208,7 +211,7 @@ impl<D: Domain> History<D> {
                 let again =
                     |seed: &u64| drawn(&Stage::Task { task: words.to_owned(), seed: *seed });
                 if !seed.as_ref().is_some_and(again) {
-                    say!(out, "# The scene was given as a file; to play this, name one here.")?;
+                    say!(out, "# The scene came from a file. Add a scene line here to play this.")?;
                 }
                 say!(out, "task {words}")?;
                 self.task_was_named = true;
@@ -234,7 +237,7 @@ fn header(out: &mut impl Write, event: &SessionOpened) -> io::Result<()> {
         true => say!(out, "recipe {}", event.recipe),
         false => say!(
             out,
-            "# The recipe {:?} does not ship; its text is in record 1. Save it and name it here.",
+            "# The recipe {:?} is not built in. Save its text from record 1 as a file and name the file here.",
             event.recipe
         ),
     }

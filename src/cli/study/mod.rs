@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use super::failure::Failure;
 
-/// Run studies, draw their figures, and ask what another configuration would have answered.
+/// Run studies, draw their figures, and rerun recorded sessions with other settings.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]

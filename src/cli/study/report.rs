@@ -8,17 +8,17 @@ use crate::study::pictures::{About, Tables, draw};
 
 /// Draw the figures and the report of a finished study again, from its tables.
 ///
-/// The same tables give the same bytes. Figures are SVG and PNG; report.html holds all of them and
-/// the summary tables in one file, without scripts.
+/// The same tables give the same bytes. The figures are SVG and PNG files. report.html contains all
+/// figures and the summary tables, without scripts.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   apprentice study report --out study
 
-Exit codes: 0 the names of the files are on standard output; 1 one of them cannot be written; 2 a
-table is missing or wrong, and file and line are named.")]
+Exit codes: 0 the names of the files are on standard output; 1 a file cannot be written; 2 a table is
+missing or wrong (the message names the file and the line).")]
 pub struct Arguments {
-    /// The study's directory, with study.toml and its tables; the pictures go there.
+    /// The study's directory, with study.toml and the tables. The figures go there too.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

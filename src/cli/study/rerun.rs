@@ -15,13 +15,12 @@ use crate::replay;
 use crate::study::rerun::{self, Report, Variant, With};
 use crate::world::household::Household;
 
-/// Ask another configuration everything that recorded people said, each at its own moment.
+/// Answer every recorded utterance again, with another threshold or another recipe.
 ///
-/// With another threshold the recorded minds are held fixed and nothing is trained under another
-/// configuration; with another recipe a mind is trained on exactly the lessons that were live then.
-/// What people said next is what they said to the recorded answers: figures are given up to the
-/// first turn of each episode whose action differs, and over all turns. The directory is copied
-/// first and stays as it is.
+/// Another threshold uses the recorded minds. Another recipe trains minds with the lessons that
+/// existed at that time. After the first different action of an episode, the user would have gone on
+/// differently. So the report gives two numbers: up to that turn, and over all turns. The command
+/// works on a copy and does not change the directory.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -30,29 +29,29 @@ Examples:
   apprentice study rerun --data lab --with condition=seq2seq-grammar --user ada
   apprentice study rerun --data lab --with recipe=mine.toml --json | jq '.variants[].up_to_the_end'
 
-docs/rerun.md says what can be known from such a replay and what can not.
+docs/rerun.md says what you can conclude from a rerun and what you cannot.
 
-Exit codes: 0 the report is on standard output; 1 somebody's records could not be read, and the
-report says whose; 2 the directory, the person or --with cannot be used.")]
+Exit codes: 0 the report is on standard output; 1 some records could not be read (the report says
+whose); 2 the directory, the user or --with cannot be used.")]
 pub struct Arguments {
-    /// The data directory; it is copied first, and the copy is read
+    /// The data directory. The command works on a copy of it
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// The other configuration: another threshold (several make a sweep), a recipe that ships
-    /// (default, default-1, default-2, paper, …), or a recipe file.
+    /// The other configuration: a threshold, a range of thresholds, a built-in recipe (default,
+    /// default-1, default-2, paper, …), or a recipe file.
     #[arg(long, value_name = "tau=T[..TO/STEP]|condition=NAME|recipe=FILE")]
     with: With,
-    /// Only this lab's people.
+    /// Only the users of this lab.
     #[arg(long, value_name = "NAME")]
     tenant: Option<String>,
-    /// Only this person, of the lab that --tenant names, else of `local`.
+    /// Only this user, of the lab in --tenant or of `local`.
     #[arg(long, value_name = "NAME")]
     user: Option<String>,
-    /// Also write every turn, the same answers too, as a table.
+    /// Also write a table of all turns, including equal answers.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// One JSON object, without times.
+    /// Print one JSON object, without times.
     #[arg(long)]
     json: bool,
 }
@@ -107,17 +106,16 @@ fn variants(with: &With) -> Result<Vec<Variant>, Failure> {
     })
 }
 
-/// A report about nobody is none.
+/// A report without people is an error.
 fn judge(report: &Report) -> Result<(), Failure> {
     if report.left_out.iter().any(|gap| gap.is_fault) {
         return Err(Failure::differences());
     }
     match (report.people, report.left_out.first()) {
-        (0, Some(first)) => Err(Failure::bad_input(format!(
-            "nobody's records can be rerun with this: {}",
-            first.why
-        ))),
-        (0, None) => Err(Failure::bad_input("nobody was recorded there")),
+        (0, Some(first)) => {
+            Err(Failure::bad_input(format!("no records can be rerun with this: {}", first.why)))
+        }
+        (0, None) => Err(Failure::bad_input("there are no records to rerun")),
         _ => Ok(()),
     }
 }

@@ -34,7 +34,7 @@ const EPISODES_MAX: u64 = 100;
 /// Bytes of a teacher file.
 const TEACHER_BYTES_MAX: u64 = 64 * 1024;
 
-/// Run a study, or go on with one that was stopped, and write its tables.
+/// Run or continue a study, and write its tables.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -42,56 +42,56 @@ Examples:
   apprentice study run --conditions default --users-per-type 20 --task-types cool,heat --seed 1 --out crossed
   apprentice study run --conditions paper --corpus utterances.jsonl.gz --seed 1 --out recorded
 
-DIR gets utterances.csv, episodes.csv, summary.csv, answered.csv and study.toml; docs/study.md
-describes them, and the simulated teachers. The same command goes on with a study that was stopped.
+The study writes utterances.csv, episodes.csv, summary.csv, answered.csv and study.toml to DIR.
+docs/study.md describes them and the simulated teachers. To continue a study that stopped, run the same
+command again.
 
-Exit codes: 0 the tables are written; 1 the study stopped, and says how to go on; 2 an argument, the
-corpus, the teacher or the directory cannot be used, or --strict met a bad line.")]
+Exit codes: 0 the tables are written; 1 the study stopped (the message says how to continue); 2 an
+argument, the corpus, the teacher or the directory cannot be used, or --strict found a bad line.")]
 pub struct Arguments {
-    /// Recipes to compare, with commas: names that ship, or files.
+    /// The recipes to compare, separated by commas: built-in names or files.
     #[arg(long, value_name = "NAME,…", default_value = "default", value_delimiter = ',')]
     conditions: Vec<String>,
-    /// Simulated users of each condition, spread over the task types [default: 20]
+    /// Simulated users per condition, divided among the task types [default: 20]
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["users_per_type", "corpus"],
         value_parser = clap::value_parser!(u64).range(1..=USERS_MAX))]
     users: Option<u64>,
-    /// Instead: simulated users of each condition and each task type.
+    /// Instead of --users: simulated users per condition and task type.
     #[arg(long, value_name = "COUNT", conflicts_with = "corpus",
         value_parser = clap::value_parser!(u64).range(1..=USERS_MAX))]
     users_per_type: Option<u64>,
-    /// Task types, with commas, or all: look, place, nested, two, clean, heat, cool.
+    /// Task types, separated by commas, or all: look, place, nested, two, clean, heat, cool.
     #[arg(long, value_name = "all|TYPE,…", value_delimiter = ',', conflicts_with = "corpus")]
     task_types: Vec<String>,
-    /// Episodes of each simulated user [default: 5]
+    /// Episodes per simulated user [default: 5]
     #[arg(long, value_name = "COUNT", conflicts_with = "corpus",
         value_parser = clap::value_parser!(u64).range(1..=EPISODES_MAX))]
     episodes: Option<u64>,
-    /// Draws tasks, scenes and everything that simulated users do.
+    /// The random seed for tasks, scenes and simulated users.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Where the study is kept.
+    /// The directory of the study.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Instead of simulated users: people who speak with these recorded sentences, one JSON object a
-    /// line; plain or gzipped.
+    /// Instead of simulated users: people who use these recorded sentences, one JSON object per line.
+    /// The file may be gzipped.
     #[arg(long, value_name = "FILE")]
     corpus: Option<PathBuf>,
-    /// Episodes of each recorded person, at most [default: 20]
+    /// The most episodes per recorded person [default: 20]
     #[arg(long, value_name = "COUNT", requires = "corpus",
         value_parser = clap::value_parser!(u64).range(1..=EPISODES_MAX))]
     episodes_max: Option<u64>,
-    /// Whose recorded sentences: a fixed two thirds to choose settings on, the held-out rest, or all.
+    /// Which people: two thirds for choosing settings, the held-out rest, or all.
     #[arg(long, value_name = "choosing|held-out|all", requires = "corpus")]
     people: Option<People>,
     /// Stop at the first bad line of the corpus.
     #[arg(long, requires = "corpus")]
     strict: bool,
-    /// The simulated teacher: its parameters and its words. One that ships (teacher, or teacher-2,
-    /// who is polite, tells things apart and makes two requests at once) or a file (TOML)
-    /// [default: teacher]
+    /// The simulated teacher's settings and words: teacher, teacher-2 (polite, tells things apart and
+    /// makes two requests at once), or a TOML file [default: teacher]
     #[arg(long, value_name = "NAME|FILE")]
     teacher: Option<PathBuf>,
-    /// People who talk at the same time; the tables do not depend on it.
+    /// How many people talk at the same time. The tables do not depend on it.
     #[arg(long, value_name = "COUNT", default_value_t = 8,
         value_parser = clap::value_parser!(u64).range(1..=256))]
     workers: u64,
@@ -165,7 +165,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Failure::failed(format!("the summary cannot be written to standard output: {error}"))
     })?;
     if let Some(report) = drawn.last() {
-        eprintln!("apprentice: figures and tables together are in {}", report.display());
+        eprintln!("apprentice: all figures and tables are in {}", report.display());
     }
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     let cpu = now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9;
@@ -190,11 +190,11 @@ fn conditions(names: &[String]) -> Result<Vec<Condition>, Failure> {
         let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
         if name.is_empty() || name.starts_with('.') || !name.chars().all(plain) {
             return Err(Failure::bad_input(format!(
-                "recipe {given} is called {name:?}; a condition's name has letters, digits, - and _"
+                "recipe {given} has the name {name:?}; a condition's name may contain letters, digits, - and _"
             )));
         }
         if conditions.iter().any(|other| other.name == name) {
-            return Err(Failure::bad_input(format!("the condition {name} is named twice")));
+            return Err(Failure::bad_input(format!("you named the condition {name} twice")));
         }
         conditions.push(Condition { name, recipe_text, recipe });
     }
@@ -237,7 +237,7 @@ fn teacher(arguments: &Arguments) -> Result<Teacher, Failure> {
     };
     let bytes = std::fs::metadata(path).map_err(|error| fail(error.to_string()))?.len();
     if bytes > TEACHER_BYTES_MAX {
-        return Err(fail(format!("it has {bytes} bytes; at most {TEACHER_BYTES_MAX} are read")));
+        return Err(fail(format!("it has {bytes} bytes; the limit is {TEACHER_BYTES_MAX}")));
     }
     let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
     Teacher::parse(&text)
@@ -247,9 +247,9 @@ fn teacher(arguments: &Arguments) -> Result<Teacher, Failure> {
 fn tell_left_out(corpus: &Corpus, torn: usize, unstaged: usize) {
     if torn + unstaged > 0 {
         eprintln!(
-            "apprentice: {torn} recorded tasks are left out because a step is missing, set aside \
-             ({} look shifted, {} cannot be said in primitives) or a bad line; {unstaged} because \
-             they fit no scene",
+            "apprentice: {torn} recorded tasks are left out because a step is missing, wrong ({} look \
+             shifted, {} cannot be said in primitives) or on a bad line; {unstaged} more because no \
+             scene suits them",
             corpus.suspect, corpus.inexpressible
         );
     }
@@ -269,7 +269,7 @@ fn failure(error: RunError) -> Failure {
 
 fn no_tables(error: TablesError, episodes: usize) -> Failure {
     Failure::failed(format!(
-        "all {episodes} episodes are finished and kept, but the tables could not be made: {error}; \
+        "all {episodes} episodes are finished and saved, but the tables could not be made: {error}; \
          run the same command again to make them"
     ))
 }

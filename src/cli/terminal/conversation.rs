@@ -16,8 +16,8 @@ use crate::ids::Seq;
 use crate::language::Answer;
 use crate::session::{Phase, Reply, Status, Told};
 
-/// How long a training may take before the conversation gives up waiting; it goes on in the
-/// service, and the person finds it done when they come back.
+/// How long the conversation waits for a training. The training goes on in the service, and the
+/// person finds it done when they come back.
 const LEARNING_MAX: Duration = Duration::from_secs(600);
 
 /// One person talking to the service, from start to `:quit`.
@@ -77,7 +77,7 @@ impl<'a> Conversation<'a> {
                 Phase::Teaching => self.teaching(&status)?,
                 Phase::Learning => self.learning()?,
                 Phase::Closed => {
-                    self.tell_one("This session was closed for good; there is no going on.")?;
+                    self.tell_one("This session is closed and cannot be opened again.")?;
                     Flow::Quit
                 }
             };
@@ -127,7 +127,7 @@ impl<'a> Conversation<'a> {
             // At a screen an empty line is a slip of the hand; in a file each line is meant.
             Line::Empty if self.screen.style() == Style::Screen => Ok(Flow::On),
             Line::Empty => self.say(""),
-            Line::Bad(sentence) => self.tell_one(&sentence),
+            Line::Bad(sentence) => self.tell_one(&print::sentence(&sentence)),
             Line::Utterance(utterance) => self.say(&utterance),
             Line::Command(command) => self.command(command),
         }
@@ -141,7 +141,7 @@ impl<'a> Conversation<'a> {
             if let Told::Answered { utterance, answer, actions_before, .. } = told {
                 let done = status.actions.iter().filter(|action| action.number > *actions_before);
                 let done: Vec<_> = done.cloned().collect();
-                self.tell(&print::answer(answer, &done))?;
+                self.tell(&print::answer(utterance, answer, &done))?;
                 if !done.is_empty() && status.phase == Phase::Interacting {
                     self.show_state(&status)?;
                 }
@@ -164,7 +164,7 @@ impl<'a> Conversation<'a> {
             if let Told::EpisodeEnded { ending, utterances, actions, .. } = told {
                 let how = match ending {
                     Ending::Achieved => "Done! The goal is reached",
-                    Ending::Abandoned => "The task ends here, short of its goal",
+                    Ending::Abandoned => "The task is over. The goal is not reached",
                 };
                 let said = print::count(*utterances, "utterance");
                 let did = print::count(*actions, "action");
@@ -186,7 +186,7 @@ impl<'a> Conversation<'a> {
                     let lines = print::why(utterance, answer);
                     self.report(&lines)
                 }
-                None => self.tell_one("There is no answer yet to explain; say something first."),
+                None => self.tell_one("There is no answer to explain yet. Say something first."),
             },
             Command::Known => {
                 let known = self.robot.known().map_err(Failure::failed)?;
@@ -213,7 +213,8 @@ impl<'a> Conversation<'a> {
         let known = self.robot.known().map_err(Failure::failed)?;
         let lesson = Seq::new(number).filter(|seq| known.iter().any(|k| k.lesson == Some(*seq)));
         let Some(lesson) = lesson else {
-            return self.tell_one(&format!("There is no lesson #{number}; :known shows them."));
+            return self
+                .tell_one(&format!("There is no lesson #{number}. :known shows your lessons."));
         };
         match self.status()?.phase {
             Phase::Interacting => {
@@ -258,7 +259,7 @@ impl<'a> Conversation<'a> {
         match failed {
             None => self.tell_one(&print::learned(waited.status.exemplars)),
             Some(reason) => self.tell_one(&format!(
-                "I could not learn that, and go on as before, because {reason}."
+                "I could not learn that: {reason}. I still know what I knew before."
             )),
         }
     }
@@ -267,10 +268,11 @@ impl<'a> Conversation<'a> {
         let left = std::mem::take(&mut self.to_forget);
         for lesson in left {
             self.tell_one(&format!(
-                "Lesson #{lesson} is not forgotten yet, because the task is not over."
+                "Lesson #{lesson} is not forgotten, because the task is not over. Type :forget \
+                 {lesson} again when you come back."
             ))?;
         }
-        self.screen.hint("Goodbye; everything is kept.").map_err(unwritable)
+        self.screen.hint("Goodbye. Everything is saved.").map_err(unwritable)
     }
 
     /// Progress and hand, for a person at a screen.
@@ -312,7 +314,7 @@ impl<'a> Conversation<'a> {
         Ok(Flow::On)
     }
 
-    fn report(&mut self, lines: &[String]) -> Result<Flow, Failure> {
+    pub(super) fn report(&mut self, lines: &[String]) -> Result<Flow, Failure> {
         self.screen.report(lines).map_err(unwritable)?;
         Ok(Flow::On)
     }

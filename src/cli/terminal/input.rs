@@ -53,7 +53,7 @@ pub enum ClashLine {
     Cancel,
 }
 
-const TEACH_HELP: &str = "answer with a first and a last action such as 3-7, or all, none, skip";
+const TEACH_HELP: &str = "type the first and the last action, such as 3-7, or all, none or skip";
 
 /// Reads a line typed during an episode. Plain `done`, `help`, `quit` and `exit` are commands too:
 /// they are the first things a newcomer tries, and no requests to a robot.
@@ -75,7 +75,7 @@ pub fn line(text: &str) -> Line {
 pub fn teach_line(text: &str) -> TeachLine {
     let text = text.trim();
     match text {
-        "" => return TeachLine::Bad(format!("that was empty; {TEACH_HELP}")),
+        "" => return TeachLine::Bad(format!("you typed nothing; {TEACH_HELP}")),
         "all" => return TeachLine::All,
         "none" | "nothing" => return TeachLine::Nothing,
         "skip" => return TeachLine::Skip,
@@ -96,7 +96,7 @@ pub fn clash_line(text: &str) -> Result<ClashLine, String> {
         "replace" | "r" => Ok(ClashLine::Replace),
         "keep" | "k" => Ok(ClashLine::Keep),
         "cancel" | "c" => Ok(ClashLine::Cancel),
-        found => Err(format!("{found:?} is no answer; say replace, keep or cancel")),
+        found => Err(format!("{found:?} is not an answer; type replace, keep or cancel")),
     }
 }
 
@@ -118,25 +118,25 @@ impl FromStr for Command {
             "forget" => {
                 let number = argument.trim_start_matches('#').parse().ok().filter(|&n| n > 0);
                 return number.map(Command::Forget).ok_or_else(|| {
-                    "which lesson? say :forget N with a number that :known shows".to_owned()
+                    "which lesson? type :forget N, with a number that :known shows".to_owned()
                 });
             }
             "task" if argument.is_empty() => {
-                return Err("which task? say for example :task clean Mug CounterTop".to_owned());
+                return Err("which task? type for example :task clean Mug CounterTop".to_owned());
             }
             "task" => return Ok(Command::Task(argument.to_owned())),
             _ => return Err(format!("there is no command :{name}; :help lists them")),
         };
         match argument.is_empty() {
             true => Ok(command),
-            false => Err(format!(":{name} takes nothing after it, found {argument:?}")),
+            false => Err(format!(":{name} takes no argument, but you typed {argument:?} after it")),
         }
     }
 }
 
 /// `"wash the mug" 3-7`, with `:=` and `actions` welcome between them as in a transcript.
 fn one_move_line(text: &str) -> Result<TeachLine, String> {
-    let form = || "say it as: teach \"wash the mug\" 3-7".to_owned();
+    let form = || "type it like this: teach \"wash the mug\" 3-7".to_owned();
     let (utterance, rest) =
         text.strip_prefix('"').and_then(|text| text.rsplit_once('"')).ok_or_else(form)?;
     let rest = rest.trim();
@@ -152,17 +152,17 @@ fn one_move_line(text: &str) -> Result<TeachLine, String> {
 
 /// `3-7`, `3..7`, `3 to 7`, `5`, `3 4 5` or `3,4,5`.
 fn actions(text: &str) -> Result<Vec<u32>, String> {
-    let bad = || format!("{text:?} names no actions; {TEACH_HELP}");
+    let bad = || format!("{text:?} is not a list of actions; {TEACH_HELP}");
     let number = |word: &str| word.trim().trim_start_matches('#').parse::<u32>().map_err(|_| bad());
     for between in ["..", "-", "–", " to "] {
         let Some((first, last)) = text.split_once(between) else { continue };
         let (first, last) = (number(first)?, number(last)?);
         if first > last {
-            return Err(format!("{text} runs backwards; {TEACH_HELP}"));
+            return Err(format!("in {text} the first action comes after the last; {TEACH_HELP}"));
         }
         // No episode is that long, and a list of a thousand million numbers helps nobody.
         if last - first >= crate::limits::EPISODE_ACTIONS_MAX as u32 {
-            return Err(format!("{text} is longer than any episode; {TEACH_HELP}"));
+            return Err(format!("{text} has more actions than a task can have; {TEACH_HELP}"));
         }
         return Ok((first..=last).collect());
     }
@@ -193,7 +193,7 @@ mod tests {
             (":forget", "a number that :known shows"),
             (":forget zero", "a number that :known shows"),
             (":forget 0", "a number that :known shows"),
-            (":why not", "takes nothing after it, found \"not\""),
+            (":why not", "takes no argument, but you typed \"not\" after it"),
             (":task", "clean Mug CounterTop"),
         ] {
             let Line::Bad(sentence) = line(text) else { panic!("{text} was read") };

@@ -119,7 +119,7 @@ impl Lines for PipedLines {
         if found > bytes.len() {
             let max = crate::limits::UTTERANCE_BYTES_MAX;
             return Ok(Typed::Unreadable(format!(
-                "That line has {found} bytes; at most {max} are read, so say it in parts."
+                "That line has {found} bytes. The limit is {max}. Say it in parts."
             )));
         }
         Ok(match String::from_utf8(bytes) {
@@ -128,7 +128,7 @@ impl Lines for PipedLines {
                 let at = error.utf8_error().valid_up_to();
                 let byte = error.as_bytes()[at];
                 Typed::Unreadable(format!(
-                    "That line is not UTF-8 text: byte 0x{byte:02x} at position {}; type plain text.",
+                    "That line is not UTF-8 text: byte 0x{byte:02x} at position {}. Type plain text.",
                     at + 1
                 ))
             }

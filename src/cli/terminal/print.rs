@@ -3,15 +3,16 @@
 use crate::language::{Accounted, Answer, Answerer, Evidence, Mood, Near, Outcome, Program, Use};
 use crate::session::{ActionView, KnownExemplar, Phase, Status, Teachable};
 use crate::world::View;
+use crate::world::household::told;
 
-/// The paper's sentence for an utterance that nothing known is close to.
-pub const NOT_SURE: &str = "I'm sorry - I don't understand!";
+/// Characters of an utterance that is quoted back. The person sees a longer one above the answer.
+const QUOTED_CHARS_MAX: usize = 60;
 
 /// The goal at the start of an episode.
 pub fn goal(goal: &str, fewest: Option<u32>) -> String {
     match fewest {
-        Some(1) => format!("Goal: {goal}. (1 action would do.)"),
-        Some(fewest) => format!("Goal: {goal}. ({fewest} actions would do.)"),
+        Some(1) => format!("Goal: {goal}. (1 action is enough.)"),
+        Some(fewest) => format!("Goal: {goal}. ({fewest} actions are enough.)"),
         None => format!("Goal: {goal}."),
     }
 }
@@ -19,11 +20,11 @@ pub fn goal(goal: &str, fewest: Option<u32>) -> String {
 /// An answer to an utterance: what was done, action by action, or why nothing was.
 ///
 /// - `done`: the actions that this utterance led to.
-pub fn answer(answer: &Answer, done: &[ActionView]) -> Vec<String> {
+pub fn answer(utterance: &str, answer: &Answer, done: &[ActionView]) -> Vec<String> {
     match &answer.outcome {
         Outcome::Understood { .. } => done.iter().map(action).collect(),
         Outcome::Impossible { program, step, reason } => vec![impossible(program, *step, reason)],
-        Outcome::NotSure => vec![not_sure(&answer.evidence)],
+        Outcome::NotSure => vec![not_sure(utterance, &answer.evidence)],
     }
 }
 
@@ -33,68 +34,75 @@ pub fn action(action: &ActionView) -> String {
 }
 
 fn impossible(program: &Program, step: u32, reason: &str) -> String {
-    let failing = program.steps.get(step as usize).map(ToString::to_string).unwrap_or_default();
-    let of = program.steps.len();
-    let reason = without_stop(reason);
-    match of {
-        1 => format!(
-            "I understand, but that cannot be done: {failing} would fail, because {reason}. \
-             I did nothing."
-        ),
-        _ => format!(
-            "I understand, but that cannot be done: step {} of {of}, {failing}, would fail, \
-             because {reason}. I did nothing. (I took it to mean: {program}.)",
+    let Some(failing) = program.steps.get(step as usize) else {
+        return format!("I can't do that: {}. Nothing changed.", without_stop(reason));
+    };
+    let (request, reason) = (told::request(failing), told::reason(failing, reason));
+    match program.steps.len() {
+        1 => format!("I can't {request}: {reason}. Nothing changed."),
+        of => format!(
+            "I can't {request} (step {} of {of}): {reason}. Nothing changed. I took it to mean: \
+             {program}.",
             step + 1
         ),
     }
 }
 
-fn not_sure(evidence: &Evidence) -> String {
+fn not_sure(utterance: &str, evidence: &Evidence) -> String {
     if let Some(mood) = &evidence.mood {
         return no_request(mood);
     }
     let left_over = unique(evidence.left_over());
     if let [words @ .., _] = &left_over[..] {
-        let are = if words.is_empty() { "is" } else { "are" };
+        let these = if words.is_empty() { "this word" } else { "these words" };
         let words = quoted(&left_over);
-        return format!("{NOT_SURE} I do not know what {words} {are} for here, so I did nothing.");
+        return format!(
+            "I don't know what to do with {words}. Nothing changed. Say it without {these}, or do it \
+             in small steps, then teach me."
+        );
     }
+    let that = match utterance.chars().count() {
+        0..=QUOTED_CHARS_MAX => format!("\"{utterance}\""),
+        _ => "that".to_owned(),
+    };
     match evidence.nearest.first() {
-        // Near enough, and still no program: a slot of it had no mention to fill it.
+        // Close enough, and still no program: a slot of it had no mention to fill it.
         Some(near) if near.distance <= evidence.threshold => format!(
-            "{NOT_SURE} The nearest thing I know is \"{}\", and not all that it needs was named.",
+            "I don't understand all of {that}. The closest request I know is \"{}\". Name every thing \
+             in it, or do it in small steps, then teach me. (:why shows more.)",
             near.exemplar
         ),
-        Some(near) => format!(
-            "{NOT_SURE} The nearest thing I know is \"{}\", at distance {:.2}; I go along up to \
-             {:.2}.",
-            near.exemplar, near.distance, evidence.threshold
+        Some(_) => format!(
+            "I don't understand {that}. Do it in small steps, then teach me. (:why shows what came \
+             closest.)"
         ),
-        None => NOT_SURE.to_owned(),
+        None => format!("I don't understand {that}. Do it in small steps, then teach me."),
     }
 }
 
-/// What was said was no request: which word says so.
+/// The utterance was no request. Says which word shows it, and what to do instead.
 fn no_request(mood: &Mood) -> String {
     match mood {
         Mood::Asked { word } => format!(
-            "I take that as a question (\"{word}\"), so I did nothing. I cannot answer questions yet."
+            "That sounds like a question (\"{word}\"). I can't answer questions. Nothing changed. \
+             (:look shows where things are.)"
         ),
-        Mood::Told { word } => {
-            format!("I take that as telling me something (\"{word}\"), so I did nothing.")
-        }
+        Mood::Told { word } => format!(
+            "That sounds like a statement (\"{word}\"). Nothing changed. Tell me what to do."
+        ),
         Mood::Forbidden { word } => {
-            format!("I take that as something not to be done (\"{word}\"), so I did nothing.")
+            format!("You told me not to do something (\"{word}\"). Nothing changed.")
         }
-        Mood::Conditional { word } => {
-            format!("I cannot wait for something to happen (\"{word}\"), so I did nothing.")
-        }
-        Mood::Later { word } => {
-            format!("I can only do things now (\"{word}\"), so I did nothing.")
-        }
+        Mood::Conditional { word } => format!(
+            "I can't wait for something to happen (\"{word}\"). Nothing changed. Tell me when it is \
+             time."
+        ),
+        Mood::Later { word } => format!(
+            "I can only do things now (\"{word}\"). Nothing changed. Tell me when it is time."
+        ),
         Mood::Reordered { word } => format!(
-            "I do things in the order in which you say them (\"{word}\"): say what comes first, \
-             first. I did nothing."
+            "I do things in the order in which you say them (\"{word}\"). Nothing changed. Say first \
+             what I must do first."
         ),
     }
 }
@@ -170,7 +178,7 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
     lines.extend(uses(&evidence.accounting));
     let chosen = unique(answer.chosen.iter().flatten().flatten().map(String::as_str));
     if !chosen.is_empty() {
-        lines.push(format!("Your words chose {}.", listed(&chosen)));
+        lines.push(format!("I took your words to mean {}.", listed(&chosen)));
     }
     let mut answered: Vec<Answerer> = evidence.answered_by.clone();
     answered.dedup();
@@ -179,7 +187,7 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
     }
     if !evidence.nearest.is_empty() {
         lines.push(format!(
-            "The nearest things I know (I go along up to a distance of {:.2}):",
+            "What came closest (a distance of up to {:.2} is close enough):",
             evidence.threshold
         ));
         lines.extend(evidence.nearest.iter().map(|near| nearest(near, evidence.threshold)));
@@ -188,28 +196,28 @@ pub fn why(utterance: &str, answer: &Answer) -> Vec<String> {
     }
     for discarded in &evidence.discarded {
         let reason = without_stop(&discarded.reason);
-        lines.push(format!("I dropped {}, because {reason}.", discarded.program));
+        lines.push(format!("I ruled out {}: {reason}.", discarded.program));
     }
     if evidence.reranked > 1 {
         lines.push(format!(
-            "{} readings were possible; what you taught me before chose among them.",
+            "{} readings were possible. I chose one by what you taught me before.",
             evidence.reranked
         ));
     }
     lines.push(match &answer.outcome {
         Outcome::Understood { program, .. } => format!("So I did {program}."),
         Outcome::Impossible { program, step, .. } => {
-            format!("So I took it to mean {program}, but step {} cannot be done here.", step + 1)
+            format!("So I took it to mean {program}, but I can't do step {} here.", step + 1)
         }
         Outcome::NotSure => match &evidence.mood {
             Some(mood) => no_request(mood),
-            None => "So I was not sure, and did nothing.".to_owned(),
+            None => "So I was not sure. Nothing changed.".to_owned(),
         },
     });
     lines
 }
 
-/// `Of your words I used "pick up" for what to do, "mug" for a thing, and nothing for "banana".`
+/// `I used "pick up" for what to do, and "mug" for a thing. I did not use "banana".`
 ///
 /// - returns: none where words are not accounted for.
 fn uses(accounting: &[Accounted]) -> Option<String> {
@@ -228,28 +236,21 @@ fn uses(accounting: &[Accounted]) -> Option<String> {
             Use::Landmark => "for where it is",
             Use::Frame => "as courtesy",
             Use::Harmless => "as small words",
-            Use::Nothing => return Some(format!("nothing for {words}")),
+            Use::Nothing => return None,
         };
         Some(format!("{words} {what}"))
     };
-    let groups = [
-        Use::Verb,
-        Use::Thing,
-        Use::Attribute,
-        Use::Landmark,
-        Use::Frame,
-        Use::Harmless,
-        Use::Nothing,
-    ];
+    let groups = [Use::Verb, Use::Thing, Use::Attribute, Use::Landmark, Use::Frame, Use::Harmless];
     let groups: Vec<String> = groups.into_iter().filter_map(group).collect();
-    match &groups[..] {
+    let used = match &groups[..] {
         [] => None,
-        [one] => Some(format!("Of your words I used {one}.")),
+        [one] => Some(format!("I used {one}.")),
         // The groups hold an "and" of their own.
-        [first @ .., last] => {
-            Some(format!("Of your words I used {}, and {last}.", first.join(", ")))
-        }
-    }
+        [first @ .., last] => Some(format!("I used {}, and {last}.", first.join(", "))),
+    };
+    let unused = of(Use::Nothing).map(|(words, _)| format!("I did not use {words}."));
+    let sentences: Vec<String> = used.into_iter().chain(unused).collect();
+    (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
 /// The same words without repetitions, each where it stood first.
@@ -284,8 +285,8 @@ fn listed<S: AsRef<str>>(parts: &[S]) -> String {
 }
 
 fn nearest(near: &Near, threshold: f32) -> String {
-    let verdict = if near.distance <= threshold { "near enough" } else { "too far" };
-    format!("  {:.2}  {:<11}  \"{}\" = {}", near.distance, verdict, near.exemplar, near.program)
+    let verdict = if near.distance <= threshold { "close enough" } else { "too far" };
+    format!("  {:.2}  {:<12}  \"{}\" = {}", near.distance, verdict, near.exemplar, near.program)
 }
 
 /// `:known`: what was taught, with the numbers that `:forget` takes, then the seeds.
@@ -314,7 +315,7 @@ pub fn status(status: &Status) -> Vec<String> {
         Phase::Interacting => "in a task",
         Phase::Teaching => "being taught",
         Phase::Learning => "learning",
-        Phase::Closed => "closed for good",
+        Phase::Closed => "closed",
     };
     lines.push(format!(
         "I am {phase}: task {}, {}, {}.",
@@ -350,12 +351,12 @@ pub fn teaching_question(said: &Teachable, actions: &[ActionView]) -> Vec<String
             lines.push("What I did after that:".to_owned());
             lines.extend(after.iter().map(|done| action(done)));
             lines.push(format!(
-                "Which of it was \"{}\"? Say a first and a last action such as {}-{}, or all, \
-                 none, skip.",
+                "Which of these actions did you mean by \"{}\"? Type the first and the last, such as \
+                 {}-{}. Or type all, none or skip (help explains them).",
                 said.utterance, first.number, last.number
             ));
         }
-        _ => lines.push("I did nothing after that, so say none or skip.".to_owned()),
+        _ => lines.push("I did nothing after that. Type none or skip.".to_owned()),
     }
     lines
 }
@@ -367,37 +368,37 @@ pub fn after<'a>(said: &Teachable, actions: &'a [ActionView]) -> Vec<&'a ActionV
 
 /// What a person is told when training is over.
 pub fn learned(examples: u32) -> String {
-    format!("learned: {}", count(examples, "example"))
+    format!("Learned. I now know {}.", count(examples, "example"))
 }
 
 pub fn help() -> Vec<String> {
     let text = "\
 Say what the robot should do, in your own words: \"go to the mug and pick it up\".
-What it does not understand, do with simple requests; after the task you teach it.
-  :look      what the robot sees and holds
-  :why       why the last answer was what it was
-  :known     every request it knows; yours have numbers
-  :status    task, goal, progress, and the actions so far
-  :done      end this task now (so does plain done)
-  :task T    what the next task is, such as :task clean Mug CounterTop
-  :forget N  take back the lesson that :known shows as #N
-  :quit      leave; everything is kept (so does the end of input)";
+If it does not understand you, do the task in small steps. You can teach it when the task is over.
+  :look      show what the robot sees and holds
+  :why       show the reason for the last answer
+  :known     list every request it knows; your lessons have numbers
+  :status    show the task, its goal and the actions so far
+  :done      end this task now (done works too)
+  :task T    choose the next task, for example :task clean Mug CounterTop
+  :forget N  forget the lesson that :known shows as #N
+  :quit      leave; everything is saved";
     text.lines().map(str::to_owned).collect()
 }
 
 pub fn teaching_help() -> Vec<String> {
     let text = "\
-Say which actions the utterance stood for:
-  3-7        actions 3 to 7 (one action: 3)
-  all        everything shown
-  none       nothing that was done is what it meant
-  skip       say nothing about it
+Say which actions your words meant:
+  3-7        actions 3 to 7 (for one action: 3)
+  all        all the actions shown
+  none       none of them
+  skip       do not teach this
   done       skip the rest and learn
-  teach \"wash the mug\" 3-7   another of the utterances, in one move";
+  teach \"wash the mug\" 3-7   teach another of your sentences";
     text.lines().map(str::to_owned).collect()
 }
 
-/// Several lines as one, for whoever reads line by line.
+/// Several lines as one, for a program that reads line by line.
 pub fn one_line(lines: &[String]) -> String {
     let mut joined = String::new();
     for line in lines.iter().map(|line| line.trim()) {
@@ -418,7 +419,7 @@ pub fn one_line(lines: &[String]) -> String {
 pub fn welcome(user: &str, status: &Status) -> String {
     if status.episodes == 0 {
         return format!(
-            "Hello, {user}! I know {}; you teach me the rest. :help says how.",
+            "Hello, {user}! I know {}. You teach me the rest. Type :help to see how.",
             count(status.exemplars, "example")
         );
     }
@@ -427,12 +428,12 @@ pub fn welcome(user: &str, status: &Status) -> String {
         n => count(n, "lesson"),
     };
     let now = match status.phase {
-        Phase::Interacting => "; you are in the middle of a task",
-        Phase::Teaching => "; you were teaching me",
-        Phase::Learning => "; I am still learning from your lessons",
+        Phase::Interacting => " You are in the middle of a task.",
+        Phase::Teaching => " You were teaching me.",
+        Phase::Learning => " I am still learning from your lessons.",
         Phase::Idle | Phase::Closed => "",
     };
-    format!("Welcome back, {user}: {} so far, {lessons}{now}.", count(status.episodes, "task"))
+    format!("Welcome back, {user}: {} so far, {lessons}.{now}", count(status.episodes, "task"))
 }
 
 /// A clause as a sentence of its own: with a capital and a full stop.
@@ -493,26 +494,36 @@ mod tests {
     fn what_was_done_is_numbered() {
         let program = "GOTO Mug; PICKUP Mug".parse().unwrap();
         let outcome = Outcome::Understood { program, bindings: vec![] };
-        let lines = answer(&answered(outcome), &[done(3, "goes to the mug"), done(12, "waits")]);
+        let done = [done(3, "goes to the mug"), done(12, "waits")];
+        let lines = answer("go", &answered(outcome), &done);
         assert_eq!(lines, ["  3  goes to the mug", " 12  waits"]);
     }
 
     #[test]
-    fn not_sure_is_the_papers_sentence_and_what_is_nearest() {
-        let lines = answer(&answered(Outcome::NotSure), &[]);
+    fn not_sure_quotes_the_words_and_says_what_to_do_next() {
+        let lines = answer("boogie", &answered(Outcome::NotSure), &[]);
         assert_eq!(
             lines,
-            ["I'm sorry - I don't understand! The nearest thing I know is \"pick up the <obj>\", \
-              at distance 0.91; I go along up to 0.42."]
+            [
+                "I don't understand \"boogie\". Do it in small steps, then teach me. (:why shows what \
+              came closest.)"
+            ]
         );
+        let lines = answer(&"boogie ".repeat(20), &answered(Outcome::NotSure), &[]);
+        assert!(lines[0].starts_with("I don't understand that. Do it"), "{lines:?}");
     }
 
     #[test]
     fn a_near_request_that_names_too_little_says_so() {
         let mut told = answered(Outcome::NotSure);
         told.evidence.nearest[0].distance = 0.2;
-        let lines = answer(&told, &[]);
-        assert!(lines[0].ends_with("and not all that it needs was named."), "{lines:?}");
+        let lines = answer("pick up", &told, &[]);
+        assert_eq!(
+            lines,
+            ["I don't understand all of \"pick up\". The closest request I know is \"pick up the \
+              <obj>\". Name every thing in it, or do it in small steps, then teach me. (:why shows \
+              more.)"]
+        );
     }
 
     fn accounting(words: &[(&str, Use)]) -> Vec<Accounted> {
@@ -526,35 +537,36 @@ mod tests {
         for (mood, sentence) in [
             (
                 Mood::Asked { word: word("did") },
-                "I take that as a question (\"did\"), so I did nothing. I cannot answer questions \
-                 yet.",
+                "That sounds like a question (\"did\"). I can't answer questions. Nothing changed. \
+                 (:look shows where things are.)",
             ),
             (
                 Mood::Told { word: word("i") },
-                "I take that as telling me something (\"i\"), so I did nothing.",
+                "That sounds like a statement (\"i\"). Nothing changed. Tell me what to do.",
             ),
             (
                 Mood::Forbidden { word: word("not") },
-                "I take that as something not to be done (\"not\"), so I did nothing.",
+                "You told me not to do something (\"not\"). Nothing changed.",
             ),
             (
                 Mood::Conditional { word: word("until") },
-                "I cannot wait for something to happen (\"until\"), so I did nothing.",
+                "I can't wait for something to happen (\"until\"). Nothing changed. Tell me when it \
+                 is time.",
             ),
             (
                 Mood::Later { word: word("tomorrow") },
-                "I can only do things now (\"tomorrow\"), so I did nothing.",
+                "I can only do things now (\"tomorrow\"). Nothing changed. Tell me when it is time.",
             ),
             (
                 Mood::Reordered { word: word("before") },
-                "I do things in the order in which you say them (\"before\"): say what comes \
-                 first, first. I did nothing.",
+                "I do things in the order in which you say them (\"before\"). Nothing changed. Say \
+                 first what I must do first.",
             ),
         ] {
             let mut told = answered(Outcome::NotSure);
             told.evidence.nearest.clear();
             told.evidence.mood = Some(mood);
-            assert_eq!(answer(&told, &[]), [sentence]);
+            assert_eq!(answer("did you wash it?", &told, &[]), [sentence]);
             let lines = why("did you wash it?", &told);
             assert_eq!(lines.last().map(String::as_str), Some(sentence));
             assert!(!lines.join("\n").contains("nothing to compare"), "{lines:?}");
@@ -566,29 +578,29 @@ mod tests {
         let mut told = answered(Outcome::NotSure);
         let mut sentence = |words: &[(&str, Use)]| {
             told.evidence.accounting = accounting(words);
-            answer(&told, &[]).remove(0)
+            answer("get it", &told, &[]).remove(0)
         };
         let (banana, kiwi, fig) =
             (("banana", Use::Nothing), ("kiwi", Use::Nothing), ("fig", Use::Nothing));
         assert_eq!(
             sentence(&[("get", Use::Verb), banana, ("the", Use::Harmless), banana]),
-            "I'm sorry - I don't understand! I do not know what \"banana\" is for here, so I did \
-             nothing."
+            "I don't know what to do with \"banana\". Nothing changed. Say it without this word, or \
+             do it in small steps, then teach me."
         );
         assert_eq!(
             sentence(&[banana, kiwi, fig]),
-            "I'm sorry - I don't understand! I do not know what \"banana\", \"kiwi\" and \"fig\" \
-             are for here, so I did nothing."
+            "I don't know what to do with \"banana\", \"kiwi\" and \"fig\". Nothing changed. Say it \
+             without these words, or do it in small steps, then teach me."
         );
-        // Every word was used: what is nearest says more.
-        assert!(sentence(&[("get", Use::Verb)]).contains("The nearest thing I know is"));
+        // Every word was used, so none is to blame.
+        assert!(sentence(&[("get", Use::Verb)]).starts_with("I don't understand \"get it\"."));
     }
 
     #[test]
     fn why_lists_what_each_word_was_used_for() {
         let mut told = answered(Outcome::NotSure);
         let text = |told: &Answer| why("please pick up the mug", told).join("\n");
-        assert!(!text(&told).contains("Of your words"), "{}", text(&told));
+        assert!(!text(&told).contains("I used"), "{}", text(&told));
         told.evidence.accounting = accounting(&[
             ("please", Use::Frame),
             ("pick up", Use::Verb),
@@ -601,12 +613,12 @@ mod tests {
             ("table", Use::Landmark),
             ("banana", Use::Nothing),
         ]);
-        let line = "Of your words I used \"pick up\" for what to do, \"mug\" and \"plate\" for \
-                    things, \"dirty\" for which one, \"table\" for where it is, \"please\" as \
-                    courtesy, \"the\" and \"and\" as small words, and nothing for \"banana\".";
+        let line = "I used \"pick up\" for what to do, \"mug\" and \"plate\" for things, \"dirty\" \
+                    for which one, \"table\" for where it is, \"please\" as courtesy, and \"the\" \
+                    and \"and\" as small words. I did not use \"banana\".";
         assert!(text(&told).contains(line), "{}", text(&told));
         told.evidence.accounting = accounting(&[("open", Use::Verb), ("fridge", Use::Thing)]);
-        let line = "Of your words I used \"open\" for what to do, and \"fridge\" for a thing.\n";
+        let line = "I used \"open\" for what to do, and \"fridge\" for a thing.\n";
         assert!(text(&told).contains(line), "{}", text(&told));
     }
 
@@ -615,12 +627,16 @@ mod tests {
         let program = "GOTO Mug; PUT Mug Table".parse().unwrap();
         let mut told = answered(Outcome::Understood { program, bindings: vec![] });
         let text = |told: &Answer| why("put the other mug there", told).join("\n");
-        assert!(!text(&told).contains("Your words chose"), "{}", text(&told));
+        assert!(!text(&told).contains("your words to mean"), "{}", text(&told));
         let mug = Some("Mug 2".to_owned());
         told.chosen = vec![vec![mug.clone()], vec![mug, None]];
-        assert!(text(&told).contains("\nYour words chose Mug 2.\n"), "{}", text(&told));
+        assert!(text(&told).contains("\nI took your words to mean Mug 2.\n"), "{}", text(&told));
         told.chosen[1][1] = Some("Table 3".to_owned());
-        assert!(text(&told).contains("Your words chose Mug 2 and Table 3."), "{}", text(&told));
+        assert!(
+            text(&told).contains("I took your words to mean Mug 2 and Table 3."),
+            "{}",
+            text(&told)
+        );
     }
 
     #[test]
@@ -630,15 +646,24 @@ mod tests {
             step,
             reason: "the fridge is closed".into(),
         };
-        let lines = answer(&answered(outcome("GOTO Fridge; PUT Mug Fridge", 1)), &[]);
+        let told = |program, step| answer("do", &answered(outcome(program, step)), &[]).remove(0);
         assert_eq!(
-            lines,
-            ["I understand, but that cannot be done: step 2 of 2, PUT Mug Fridge, would fail, \
-              because the fridge is closed. I did nothing. (I took it to mean: GOTO Fridge; PUT \
-              Mug Fridge.)"]
+            told("GOTO Fridge; PUT Mug Fridge", 1),
+            "I can't put the mug in the fridge (step 2 of 2): the fridge is closed. Nothing changed. \
+             I took it to mean: GOTO Fridge; PUT Mug Fridge."
         );
-        let lines = answer(&answered(outcome("PUT Mug Fridge", 0)), &[]);
-        assert!(lines[0].contains("PUT Mug Fridge would fail, because"), "{lines:?}");
+        assert_eq!(
+            told("PUT Mug Fridge", 0),
+            "I can't put the mug in the fridge: the fridge is closed. Nothing changed."
+        );
+        assert_eq!(
+            told("OPEN Fridge", 0),
+            "I can't open the fridge: it is closed. Nothing changed."
+        );
+        assert_eq!(
+            told("OPEN Fridge", 7),
+            "I can't do that: the fridge is closed. Nothing changed."
+        );
     }
 
     #[test]
@@ -647,11 +672,11 @@ mod tests {
         let text = lines.join("\n");
         for part in [
             "I read it as \"wash the <obj>\".",
-            "up to a distance of 0.42",
-            "0.91  too far      \"pick up the <obj>\" = PICKUP <obj:1>",
-            "I dropped PICKUP Mug, because the hand is full.",
-            "2 readings were possible",
-            "So I was not sure, and did nothing.",
+            "a distance of up to 0.42 is close enough",
+            "0.91  too far       \"pick up the <obj>\" = PICKUP <obj:1>",
+            "I ruled out PICKUP Mug: the hand is full.",
+            "2 readings were possible.",
+            "So I was not sure. Nothing changed.",
         ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
@@ -731,9 +756,9 @@ mod tests {
         };
         let lines = teaching_question(&said, &[done(1, "a"), done(2, "b"), done(3, "c")]);
         assert_eq!(lines[2..4], ["  2  b", "  3  c"]);
-        assert!(lines[4].contains("such as 2-3"), "{lines:?}");
+        assert!(lines[4].contains("such as 2-3."), "{lines:?}");
         let nothing = teaching_question(&said, &[done(1, "a")]);
-        assert!(nothing[1].contains("say none or skip"), "{nothing:?}");
+        assert!(nothing[1].contains("Type none or skip"), "{nothing:?}");
     }
 
     #[test]
@@ -746,7 +771,7 @@ mod tests {
     fn progress_marks_what_holds() {
         let parts = [("the mug is clean".to_owned(), true), ("it is away".to_owned(), false)];
         assert_eq!(progress(&parts), "[x] the mug is clean  [ ] it is away");
-        assert_eq!(goal("wash the mug", Some(8)), "Goal: wash the mug. (8 actions would do.)");
-        assert_eq!(learned(45), "learned: 45 examples");
+        assert_eq!(goal("wash the mug", Some(8)), "Goal: wash the mug. (8 actions are enough.)");
+        assert_eq!(learned(45), "Learned. I now know 45 examples.");
     }
 }

@@ -26,7 +26,7 @@ impl Conversation<'_> {
             TeachLine::All => {
                 let after = print::after(&said, &status.actions);
                 match after.is_empty() {
-                    true => self.tell_one("I did nothing after that; say none or skip."),
+                    true => self.tell_one("I did nothing after that. Type none or skip."),
                     false => self.teach(&said, after.iter().map(|a| a.number).collect()),
                 }
             }
@@ -40,13 +40,13 @@ impl Conversation<'_> {
                 match named.find(|teachable| teachable.utterance == utterance).cloned() {
                     Some(named) => self.teach(&named, actions.unwrap_or_default()),
                     None => self.tell_one(&format!(
-                        "There is no \"{utterance}\" to teach; these are: {}.",
+                        "You cannot teach \"{utterance}\" now. You can teach {}.",
                         quoted_list(&status.to_teach)
                     )),
                 }
             }
             TeachLine::Command(Command::Done) => self.finish_teaching(),
-            TeachLine::Command(Command::Help) => self.tell(&print::teaching_help()),
+            TeachLine::Command(Command::Help) => self.report(&print::teaching_help()),
             TeachLine::Command(command) => self.command(command),
             TeachLine::Bad(sentence) => self.tell_one(&print::sentence(&sentence)),
         }
@@ -107,7 +107,7 @@ impl Conversation<'_> {
                 format!("Understood: \"{utterance}\" means {program}.")
             }
             Told::Declined { utterance, .. } => {
-                format!("Understood: nothing that was done is \"{utterance}\".")
+                format!("Understood: none of these actions means \"{utterance}\".")
             }
             Told::Forgotten { utterance, .. } => {
                 format!("Forgotten: what \"{utterance}\" meant before.")

@@ -32,7 +32,7 @@ impl TranscriptFile {
         let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
         if bytes > FILE_BYTES_MAX {
             return Err(Failure::bad_input(format!(
-                "{name} has {bytes} bytes; a transcript has at most {FILE_BYTES_MAX}"
+                "{name} has {bytes} bytes; the limit is {FILE_BYTES_MAX}"
             )));
         }
         let text = std::fs::read_to_string(path).map_err(unreadable)?;

@@ -17,7 +17,7 @@ use crate::language::{Evidence, Outcome};
 use crate::service::{Data, Service};
 pub use file::{PlayedFile, TranscriptFile};
 
-/// Play transcripts: conversations written down, with their answers.
+/// Play transcripts: conversations as text, with the expected answers.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -26,8 +26,8 @@ Examples:
 
 docs/transcripts.md describes the notation.
 
-Exit codes: 0 every answer agrees; 1 some do not, and a diff was printed; 2 a file cannot be read or
-has an error (line, column, what was expected).")]
+Exit codes: 0 all answers agree; 1 some differ (a diff is printed); 2 a file cannot be read or has an
+error (the message gives the line and the column).")]
 pub struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -35,9 +35,9 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Play one against a fresh service and print it with the real answers.
+    /// Play one transcript with a new service and print it with the real answers.
     Run { file: PathBuf },
-    /// Play each and print a diff of the answers that differ.
+    /// Play each transcript and print the answers that differ, as a diff.
     Check {
         #[arg(required = true)]
         files: Vec<PathBuf>,

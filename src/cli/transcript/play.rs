@@ -114,7 +114,7 @@ impl<'a> Player<'a> {
                 let bytes = std::fs::metadata(&path).map_err(unreadable)?.len();
                 if bytes > SCENE_FILE_BYTES_MAX as u64 {
                     return Err(wrong(format!(
-                        "scene {} has {bytes} bytes; at most {SCENE_FILE_BYTES_MAX} are read",
+                        "scene {} has {bytes} bytes; the limit is {SCENE_FILE_BYTES_MAX}",
                         path.display()
                     )));
                 }
@@ -161,7 +161,7 @@ impl<'a> Player<'a> {
             }
             (Some(_), None) => Err(PlayError::Line {
                 line,
-                reason: "a scene file needs a task line above the episode".to_owned(),
+                reason: "a scene file needs a task line before the episode".to_owned(),
             }),
             (None, Some(task)) => Ok(Stage::Task { task: task.clone(), seed: self.seed }),
             (None, None) => Ok(Stage::Seed { seed: self.seed }),
@@ -176,7 +176,7 @@ impl<'a> Player<'a> {
         let open = named().find(|said| !said.carried_out && !said.settled);
         open.or_else(|| named().next()).map(|said| said.seq).ok_or_else(|| PlayError::Line {
             line,
-            reason: format!("nobody said {utterance:?} above this line"),
+            reason: format!("{utterance:?} was not said above this line"),
         })
     }
 

@@ -192,7 +192,7 @@ fn a_file_that_is_not_as_written_is_refused_with_its_line() {
     assert!(refused(&good.replacen("\nleaf", "\nmore\nleaf", 1)).starts_with("line 6: "));
     assert!(refused(&good.replacen("proof 1", "proof 2", 1)).contains("does not begin"));
     assert!(refused("apprentice proof 1\n").contains("no blank line"));
-    assert!(refused("apprentice proof 1\n\nnote").contains("shows nothing"));
+    assert!(refused("apprentice proof 1\n\nnote").contains("proves nothing"));
     let upper = good.replacen("0101010101", "0A0A0A0A0A", 1);
     assert!(refused(&upper).contains("stream key"));
     let many = format!("apprentice proof 1\nsince 1{}\n\nx", hashes(&[TreeHash::empty(); 66]));

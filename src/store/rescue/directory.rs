@@ -53,9 +53,9 @@ pub struct StreamFound {
 pub enum Loss {
     #[error("{} of {acknowledged} records, from {} on: {reason}", acknowledged - valid, valid + 1)]
     Tail { acknowledged: u64, valid: u64, reason: String },
-    #[error("records after {valid} are there and do not continue it: {reason}")]
+    #[error("records after {valid} exist but do not continue the chain: {reason}")]
     Beyond { valid: u64, reason: String },
-    #[error("the key: its records are kept sealed and cannot be read: {0}")]
+    #[error("the key: its records are kept sealed and cannot be decrypted: {0}")]
     Key(KeyError),
 }
 
@@ -258,7 +258,7 @@ impl Rescue {
         own.retain(|(frame, _)| !others.iter().any(|other| self.opens(other, frame)));
         match own.is_empty() {
             false => Ok(own),
-            true => Err("record 1 in its pages is another lab's".to_owned()),
+            true => Err("record 1 in its pages belongs to another lab".to_owned()),
         }
     }
 

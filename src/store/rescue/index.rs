@@ -211,7 +211,7 @@ impl Index {
         (acknowledged, pages): (bool, Pages),
         mut accept: impl FnMut(&[u8]) -> Result<T, String>,
     ) -> Result<Vec<(Vec<u8>, T)>, String> {
-        let mut reason = format!("no whole copy of record {seq} is there");
+        let mut reason = format!("no complete copy of record {seq} was found");
         let mut accepted = Vec::new();
         for frame in self.candidates(stream, seq, acknowledged, pages) {
             match accept(&frame) {

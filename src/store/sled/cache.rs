@@ -25,7 +25,7 @@ impl SledCache {
     /// Opens the cache in `dir`; one that does not open is replaced by an empty one.
     pub(in super::super) fn open(dir: &Path, lock: Arc<DirLock>) -> Result<SledCache, String> {
         let db = open_database(dir, CACHE_BYTES).or_else(|reason| {
-            tracing::warn!(%reason, "the cache of minds and snapshots is damaged and starts afresh");
+            tracing::warn!(%reason, "the cache of minds and snapshots is damaged and is emptied");
             if dir.exists() {
                 fs::remove_dir_all(dir).map_err(|error| error.to_string())?;
             }

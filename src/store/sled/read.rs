@@ -176,7 +176,8 @@ impl Iterator for Frames {
 
 fn other_end(end: Head, found: Digest) -> ReadError {
     let (expected, found) = (end.digest.to_hex(), found.to_hex());
-    let reason = format!("the stream's head has the digest {expected}, this is {found}");
+    let reason =
+        format!("the head of the stream has digest {expected}, but this record has {found}");
     ReadError::Seal { seq: end.seq, reason }
 }
 
@@ -215,5 +216,5 @@ fn next(values: &mut ::sled::Iter) -> Result<Option<Entry>, ReadError> {
 }
 
 fn foreign_key(key: &[u8]) -> ReadError {
-    ReadError::Store { reason: format!("{} bytes of a key that names no record", key.len()) }
+    ReadError::Store { reason: format!("{} bytes of a key that does not name a record", key.len()) }
 }

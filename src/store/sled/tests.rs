@@ -245,7 +245,7 @@ fn a_lost_tail_is_reported_with_stream_and_counts() {
     assert_eq!(damage(dir.path()), [lost(ada.clone(), 7, 3), lost(grace, 2, 0)]);
     let Err(error) = open(dir.path()) else { panic!("a lost tail went unnoticed") };
     let error = error.to_string();
-    for part in [&ada.to_string(), "7 records were acknowledged, only 3", "restore it"] {
+    for part in [&ada.to_string(), "7 records were acknowledged, but only 3", "restore it"] {
         assert!(error.contains(part), "{part:?} is not in {error:?}");
     }
 }

@@ -72,7 +72,7 @@ impl Watch {
         let watch = move || {
             while stopped.recv_timeout(patience / 4) == Err(RecvTimeoutError::Timeout) {
                 let Some(promises) = shared.in_hand.overdue(patience) else { continue };
-                let reason = format!("the disk has not taken a record within {patience:?}");
+                let reason = format!("the disk did not store a record within {patience:?}");
                 shared.hangs.store(true, Ordering::SeqCst);
                 shared.poison(reason.clone());
                 for promise in promises {

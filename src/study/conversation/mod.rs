@@ -124,7 +124,7 @@ pub enum ConversationError {
     Read { path: PathBuf, error: std::io::Error },
     #[error("{} has no transcript; transcripts are files whose names end in .txt", path.display())]
     Empty { path: PathBuf },
-    #[error("{} has {bytes} bytes; a transcript has at most {FILE_BYTES_MAX}", path.display())]
+    #[error("{} has {bytes} bytes; the limit is {FILE_BYTES_MAX}", path.display())]
     TooLarge { path: PathBuf, bytes: u64 },
     #[error("{}: {error}", path.display())]
     Syntax { path: PathBuf, error: SyntaxError },

@@ -153,12 +153,12 @@ impl<'a> Player<'a> {
 
     fn start(&mut self) -> Result<(), String> {
         if self.episode.as_ref().is_some_and(|episode| !episode.over) {
-            return Err("the episode above was not ended; put done before this line".to_owned());
+            return Err("the episode above has no end; put done before this line".to_owned());
         }
         let seed = self.seed;
         let stage = match (&self.scene, &self.task) {
             (Some(scene), Some(task)) => Stage::Scene { scene: scene.clone(), task: task.clone() },
-            (Some(_), None) => return Err("a scene needs a task line as well".to_owned()),
+            (Some(_), None) => return Err("a scene needs a task line too".to_owned()),
             (None, Some(task)) => Stage::Task { task: task.clone(), seed },
             (None, None) => Stage::Seed { seed },
         };
@@ -182,7 +182,7 @@ impl<'a> Player<'a> {
                 episode.over = true;
                 Ok(())
             }
-            _ => Err("no episode runs here".to_owned()),
+            _ => Err("there is no episode here".to_owned()),
         }
     }
 
@@ -236,7 +236,11 @@ impl<'a> Player<'a> {
         let mind = self.mind.as_ref().unwrap_or(self.before);
         let episode = match &mut self.episode {
             Some(episode) if !episode.over => episode,
-            _ => return Err(wrong("no episode runs here; put an episode line above".to_owned())),
+            _ => {
+                return Err(wrong(
+                    "there is no episode here; put an episode line above".to_owned(),
+                ));
+            }
         };
         let (scene, task) = (episode.scene.clone(), episode.task.clone());
         let said = Said { utterance, scene: scene.clone(), mentioned: episode.mentioned.clone() };
@@ -311,7 +315,7 @@ impl<'a> Player<'a> {
         (first, last): (u32, u32),
         on_clash: OnClash,
     ) -> Result<(), String> {
-        let nobody = || format!("nobody said {text:?} in the episode above");
+        let nobody = || format!("{text:?} was not said in the episode above");
         let episode = self.episode.as_ref().ok_or_else(nobody)?;
         let said = episode.said.iter().rev().find(|said| said.utterance.as_str() == text.trim());
         let said = said.ok_or_else(nobody)?;

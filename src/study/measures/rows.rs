@@ -35,7 +35,7 @@ pub struct Life<'a> {
 
 /// Log and journal do not belong together.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the records of {user} in condition {condition} do not fit the journal: {reason}")]
+#[error("the records of {user} in condition {condition} do not match the journal: {reason}")]
 pub struct LifeError {
     pub condition: String,
     pub user: String,
@@ -210,7 +210,7 @@ impl<'a> Reader<'a> {
     fn interpreted(&mut self, seq: u64, event: &Interpreted) -> Result<(), String> {
         let Some(present) = &mut self.present else { return Ok(()) };
         let turn = present.entry.turns.iter().find(|turn| turn.seq == seq);
-        let turn = turn.ok_or_else(|| format!("record {seq} is an utterance that it lacks"))?;
+        let turn = turn.ok_or_else(|| format!("it lacks the utterance of record {seq}"))?;
         present.turn += 1;
         let before = present.scene.clone();
         let mut right = None;

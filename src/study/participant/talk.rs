@@ -24,7 +24,7 @@ pub enum TalkError {
     Client(#[from] ClientError),
     #[error("the stage cannot be set: {0}")]
     Stage(#[from] StageError),
-    #[error("the service did something else than it said: {0}")]
+    #[error("the service did not do what it said: {0}")]
     Puzzling(String),
 }
 

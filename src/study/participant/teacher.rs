@@ -245,7 +245,7 @@ fn templates(
         let known = needed.iter().chain(allowed);
         let rest = known.fold(template.clone(), |rest, name| rest.replace(name, ""));
         if rest.contains(['{', '}']) {
-            return bad(format!("has {template:?} with a brace that means nothing there"));
+            return bad(format!("has {template:?} with an unknown brace"));
         }
     }
     Ok(templates)
@@ -260,13 +260,15 @@ fn check_words(
         return Err(format!("[{section}] has no words for {missing}"));
     }
     if let Some(other) = words.keys().find(|key| !keys.contains(&key.as_str())) {
-        return Err(format!("[{section}] knows no {other}; it has {}", keys.join(", ")));
+        return Err(format!("[{section}] does not know {other}; it has {}", keys.join(", ")));
     }
     for wording in words.values().flatten() {
         let rest = PLACEHOLDERS.iter().fold(wording.clone(), |rest, name| rest.replace(name, ""));
         if rest.contains(['{', '}']) {
             let known = PLACEHOLDERS.join(", ");
-            return Err(format!("{wording:?} of [{section}] has a brace that is none of {known}"));
+            return Err(format!(
+                "{wording:?} of [{section}] has a brace that is not one of {known}"
+            ));
         }
     }
     Ok(())
@@ -305,7 +307,7 @@ mod tests {
         };
         check("framed = ", "framed = 1", "framed is 1");
         check("the other {name}", "the other {thing}", "needs {name} once");
-        check("please {request}", "please {request} {thing}", "means nothing there");
+        check("please {request}", "please {request} {thing}", "an unknown brace");
         check("{first} and {second}", "{first} and {first}", "needs {first} once");
     }
 

@@ -344,7 +344,7 @@ fn records(text: &str) -> Result<Vec<Numbered>, (usize, String)> {
                 (closed, begun) = (false, line);
             }
             c if closed || c == '"' => {
-                return Err((line, format!("{c:?} stands where a comma was expected")));
+                return Err((line, format!("expected a comma, found {c:?}")));
             }
             c => field.push(c),
         }
@@ -378,7 +378,7 @@ mod tests {
         assert_eq!(records("a\n\"b").unwrap_err().0, 2);
         assert_eq!(
             records("a\n\"b\"c").unwrap_err(),
-            (2, "'c' stands where a comma was expected".to_owned())
+            (2, "expected a comma, found 'c'".to_owned())
         );
     }
 

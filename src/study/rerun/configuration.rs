@@ -75,14 +75,14 @@ impl FromStr for With {
     fn from_str(text: &str) -> Result<With, WithError> {
         let wrong = |reason: String| WithError(format!("{reason}; possible are {POSSIBLE}"));
         let Some((key, value)) = text.split_once('=') else {
-            return Err(wrong(format!("{text:?} names no configuration")));
+            return Err(wrong(format!("{text:?} does not name a configuration")));
         };
         match key.trim() {
             "tau" => thresholds(value.trim()).map(With::Thresholds).map_err(wrong),
             "condition" => conditions(value.trim()).map(With::Conditions).map_err(WithError),
-            "recipe" if value.trim().is_empty() => Err(wrong("recipe= names no file".to_owned())),
+            "recipe" if value.trim().is_empty() => Err(wrong("recipe= needs a file".to_owned())),
             "recipe" => Ok(With::File(value.trim().to_owned())),
-            other => Err(wrong(format!("{other:?} is nothing that can be another"))),
+            other => Err(wrong(format!("{other:?} is not a setting that can be changed"))),
         }
     }
 }
@@ -136,7 +136,7 @@ fn range(part: &str, from: &str, rest: &str) -> Result<Vec<f32>, String> {
         return Err(format!("{part:?} has a step of 0"));
     }
     if from > to {
-        return Err(format!("{part:?} runs backwards"));
+        return Err(format!("{part:?} goes backwards; write the smaller number first"));
     }
     if ((to - from) / step) as usize >= SWEEP_MAX {
         return Err(format!("{part:?} has more than {SWEEP_MAX} values"));
@@ -174,7 +174,7 @@ fn decimal(text: &str) -> Result<Decimal, String> {
         && digits.bytes().all(|byte| byte.is_ascii_digit());
     match digits.parse() {
         Ok(digits) if fits => Ok(Decimal { digits, places: fraction.len() as u32 }),
-        _ => Err(format!("{text:?} is no number such as 0.35")),
+        _ => Err(format!("{text:?} is not a number such as 0.35")),
     }
 }
 
@@ -216,18 +216,18 @@ mod tests {
              seq2seq, seq2seq-grammar"
         );
         for (text, part) in [
-            ("tau", "\"tau\" names no configuration; possible are tau=0.3"),
-            ("speed=3", "\"speed\" is nothing that can be another; possible are tau=0.3"),
-            ("tau=", "\"\" is no number such as 0.35; possible"),
-            ("tau=-1", "\"-1\" is no number such as 0.35; possible"),
-            ("tau=NaN", "\"NaN\" is no number"),
+            ("tau", "\"tau\" does not name a configuration; possible are tau=0.3"),
+            ("speed=3", "\"speed\" is not a setting that can be changed; possible are tau=0.3"),
+            ("tau=", "\"\" is not a number such as 0.35; possible"),
+            ("tau=-1", "\"-1\" is not a number such as 0.35; possible"),
+            ("tau=NaN", "\"NaN\" is not a number"),
             ("tau=2.5", "tau is 2.5; it is between 0 and 2"),
             ("tau=0.1..0.6", "has no step; write it as 0.1..0.6/0.1"),
             ("tau=0.1..0.6/0", "has a step of 0"),
-            ("tau=0.6..0.1/0.1", "runs backwards"),
+            ("tau=0.6..0.1/0.1", "goes backwards"),
             ("tau=0..2/0.000001", "has more than 100 values"),
-            ("tau=99999999999999999999", "is no number"),
-            ("recipe=", "recipe= names no file; possible"),
+            ("tau=99999999999999999999", "is not a number"),
+            ("recipe=", "recipe= needs a file; possible"),
             ("condition=", "there is no condition \"\""),
         ] {
             assert!(refused(text).contains(part), "{text}: {}", refused(text));

@@ -21,10 +21,12 @@ impl Display for Report {
         let minds = &self.minds;
         if minds.trained + minds.trainings_failed > 0 {
             let trained = count(minds.trained as usize, "mind", "minds");
-            write!(f, "trained for this: {trained} of lessons")?;
+            write!(f, "trained for this: {trained} with lessons")?;
             match minds.trainings_failed {
                 0 => writeln!(f)?,
-                failed => writeln!(f, "; {failed} trainings failed, and the mind before stayed")?,
+                failed => {
+                    writeln!(f, "; {failed} trainings failed, so the minds before them were used")?
+                }
             }
         }
         if minds.recorded > 0 {
@@ -32,13 +34,13 @@ impl Display for Report {
             let minds = count(all as usize, "mind", "minds");
             writeln!(
                 f,
-                "recorded: {minds} of lessons, {again} of them made again from the log, digest for \
+                "recorded: {minds} with lessons; {again} of them rebuilt from the log, with the same \
                  digest"
             )?;
         }
         for LeftOut { tenant, user, why, is_fault } in &self.left_out {
-            let who = user.as_ref().map_or("somebody", |user| user.as_str());
-            let mark = if *is_fault { "LEFT OUT, AND SOMETHING IS WRONG" } else { "left out" };
+            let who = user.as_ref().map_or("unknown user", |user| user.as_str());
+            let mark = if *is_fault { "LEFT OUT BECAUSE OF A FAULT" } else { "left out" };
             let left_out = format!("{mark}: {tenant}/{who}: {why}");
             writeln!(f, "{}", plain::escape(&left_out))?;
         }
@@ -118,7 +120,7 @@ fn alone(f: &mut fmt::Formatter<'_>, variant: &VariantReport) -> fmt::Result {
     match episodes.loop_end_turn {
         None => writeln!(
             f,
-            "No action differs in any of the {}: nobody would have seen another room.",
+            "No action differs in any of the {}, so every user would have seen the same scenes.",
             count(episodes.episodes, "episode", "episodes")
         )?,
         Some(turn) => writeln!(
@@ -131,13 +133,13 @@ fn alone(f: &mut fmt::Formatter<'_>, variant: &VariantReport) -> fmt::Result {
     if let Some(recorded) = episodes.normalised_length_recorded {
         write!(f, "Normalised episode length: {recorded:.3} recorded; ")?;
         match (episodes.loop_ends, episodes.normalised_length_unchanged) {
-            (0, _) => writeln!(f, "the other's is the same.")?,
+            (0, _) => writeln!(f, "the other is the same.")?,
             (_, Some(unchanged)) => writeln!(
                 f,
-                "{unchanged:.3} where the loop never ends, the same for both; elsewhere the \
-                 other's is unknown."
+                "{unchanged:.3} for both in episodes where the loop never ends; unknown for the other \
+                 in the rest."
             )?,
-            (_, None) => writeln!(f, "the other's is unknown, since every loop ends.")?,
+            (_, None) => writeln!(f, "the other is unknown, because every loop ends.")?,
         }
     }
     Ok(())
@@ -204,7 +206,7 @@ fn sweep(f: &mut fmt::Formatter<'_>, variants: &[VariantReport]) -> fmt::Result 
             figures.recorded.complexity
         )?;
     }
-    writeln!(f, "Each turn of each is in --json and in --out FILE.csv.")
+    writeln!(f, "--json and --out FILE.csv give every turn.")
 }
 
 fn said(outcome: &Outcome) -> String {

@@ -114,9 +114,9 @@ pub fn difference(before: &str, now: &str) -> Option<String> {
     let only = |ones: &[String], others: &[String]| {
         let gone: Vec<&str> =
             ones.iter().filter(|one| !others.contains(one)).map(String::as_str).collect();
-        if gone.is_empty() { "nothing of the kind".to_owned() } else { gone.join(", ") }
+        if gone.is_empty() { "no such settings".to_owned() } else { gone.join(", ") }
     };
-    Some(format!("it has {}; now there is {}", only(&before, &now), only(&now, &before)))
+    Some(format!("it has {}; you asked for {}", only(&before, &now), only(&now, &before)))
 }
 
 /// Where a condition's service keeps its data.
@@ -159,6 +159,6 @@ mod tests {
     fn designs_differ_in_what_is_named() {
         assert_eq!(difference(&design(7).text(), &design(7).text()), None);
         let difference = difference(&design(7).text(), &design(8).text()).unwrap();
-        assert_eq!(difference, "it has seed = 7; now there is seed = 8");
+        assert_eq!(difference, "it has seed = 7; you asked for seed = 8");
     }
 }

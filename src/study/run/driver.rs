@@ -243,7 +243,10 @@ impl Run<'_> {
             };
             let person = planned.script.is_none().then(|| person.clone());
             journal.note(Line { entry, person }).map_err(|error| {
-                (format!("episode {number} of {user} could not be noted"), error.to_string())
+                (
+                    format!("episode {number} of {user} could not be written to the journal"),
+                    error.to_string(),
+                )
             })?;
             done.fetch_add(1, Ordering::Relaxed);
             self.progress.advance();

@@ -28,7 +28,7 @@ impl Transcript {
             plain::check(&text.replace('\t', " ")).map_err(|hidden| SyntaxError {
                 line: number,
                 column: hidden.place,
-                reason: format!("U+{:04X} is no plain character", u32::from(hidden.found)),
+                reason: format!("U+{:04X} is not a plain character", u32::from(hidden.found)),
             })?;
             let mut cursor = Cursor { line: number, text, rest: text };
             let kind = cursor.line()?;
@@ -58,7 +58,7 @@ fn check_places(lines: &[Line]) -> Result<(), SyntaxError> {
                 );
             }
             Kind::Answer(_) if !acted => {
-                return wrong("this answer has nothing above it to answer".to_owned());
+                return wrong("there is no line above this answer that it could answer".to_owned());
             }
             Kind::Setting(setting @ (Setting::User(_) | Setting::Recipe(_))) => {
                 let (name, seen) = match setting {
@@ -66,10 +66,12 @@ fn check_places(lines: &[Line]) -> Result<(), SyntaxError> {
                     _ => ("recipe", &mut recipe),
                 };
                 if acted {
-                    return wrong(format!("{name} is a header: it stands above the first episode"));
+                    return wrong(format!(
+                        "{name} is a header line; put it above the first episode"
+                    ));
                 }
                 if let Some(first) = seen.replace(line.number) {
-                    return wrong(format!("{name} was given at line {first} already"));
+                    return wrong(format!("{name} was already given at line {first}"));
                 }
             }
             _ => {}
@@ -83,10 +85,10 @@ fn check_names(program: &Program, on: &[String]) -> Result<(), String> {
     let kinds: Vec<&str> = on.iter().map(|name| Request::kind(name)).collect();
     for (place, (name, kind)) in on.iter().zip(&kinds).enumerate() {
         if !program.steps.iter().any(|step| step.args.iter().any(|arg| arg == *kind)) {
-            return Err(format!("{program} names no thing that {name:?} could be"));
+            return Err(format!("{program} has no thing that {name:?} could be"));
         }
         if kinds[..place].contains(kind) {
-            return Err(format!("{name:?} is the second {kind}; one can be meant"));
+            return Err(format!("{name:?} is the second {kind}; name only one"));
         }
     }
     Ok(())
@@ -467,13 +469,13 @@ learn    45 examples
             ("~~ nothing", 1, 1, "meant, and there is none"),
             ("> a\ndone\n~~ nothing", 3, 1, "meant, and there is none"),
             ("> a\n~~ ", 2, 4, "expected nothing, or a program"),
-            ("> a\n~~ PICKUP Mug on Cup 2", 2, 4, "names no thing that \"Cup 2\" could be"),
+            ("> a\n~~ PICKUP Mug on Cup 2", 2, 4, "has no thing that \"Cup 2\" could be"),
             ("> a\n~~ PICKUP Mug on Mug 2, Mug 1", 2, 4, "the second Mug"),
             ("learn 45", 1, 9, "found \"\", expected examples"),
             ("> a\ndone now", 2, 6, "expected the end of the line"),
-            ("= GOTO Mug", 1, 1, "nothing above it"),
+            ("= GOTO Mug", 1, 1, "no line above this answer"),
             ("> a\nrecipe paper", 2, 1, "recipe is a header"),
-            ("user a\nuser b", 2, 1, "given at line 1 already"),
+            ("user a\nuser b", 2, 1, "already given at line 1"),
         ];
         for (text, line, column, reason) in cases {
             let error = Transcript::parse(text).unwrap_err();

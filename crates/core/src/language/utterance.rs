@@ -13,13 +13,13 @@ pub struct Utterance(String);
 /// Why a text is no utterance. A sentence for the person who typed it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UtteranceError {
-    #[error("that was empty; type what the robot should do")]
+    #[error("that is empty; type what the robot should do")]
     Empty,
-    #[error("that has no words in it; type what the robot should do")]
+    #[error("there are no words in that; type what the robot should do")]
     NoWords,
-    #[error("that has {found} bytes; at most {UTTERANCE_BYTES_MAX} are read, so say it in parts")]
+    #[error("that has {found} bytes; the limit is {UTTERANCE_BYTES_MAX}, so say it in parts")]
     TooManyBytes { found: usize },
-    #[error("that has {found} words; at most {UTTERANCE_WORDS_MAX} are read, so say it in parts")]
+    #[error("that has {found} words; the limit is {UTTERANCE_WORDS_MAX}, so say it in parts")]
     TooManyWords { found: usize },
     #[error("in that, {0}")]
     Hidden(Hidden),

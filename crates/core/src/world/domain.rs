@@ -184,9 +184,11 @@ pub enum StageError {
     #[error("the scene file has an error at line {line}, column {column}: {reason}")]
     Scene { line: usize, column: usize, reason: String },
     /// There would be nothing to do.
-    #[error("the goal holds already: {goal}; change the scene or name another task")]
+    #[error("the goal is already reached: {goal}; change the scene or name another task")]
     Achieved { goal: String },
-    #[error("no scene drawn from seed {seed} makes the task {task:?} possible: {reason}")]
+    #[error(
+        "seed {seed} gives no scene in which the task {task:?} is possible: {reason}; try another seed"
+    )]
     Unsolvable { task: String, seed: u64, reason: String },
 }
 

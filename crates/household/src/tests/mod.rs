@@ -9,6 +9,7 @@ mod primitives;
 mod speed;
 mod stages;
 mod talk;
+mod told;
 
 use super::{Household, Scene, Task};
 use crate::language::{Mention, Program, Symbol};

@@ -47,7 +47,7 @@ fn a_scene_document_that_does_not_fit_together_is_refused_with_the_reason() {
         let text = text.replacen(from, to, 1);
         serde_json::from_str::<Scene>(&text).unwrap_err().to_string()
     };
-    assert!(broken("\"kitchen\"", "\"cellar\"").contains("\"cellar\" is no room"));
+    assert!(broken("\"kitchen\"", "\"cellar\"").contains("\"cellar\" is not a room"));
     assert!(broken("\"type\":\"Mug\"", "\"type\":\"Mugg\"").contains("the nearest is Mug"));
     let holds = "\"robot\":{\"holds\":\"Fridge\",";
     assert!(broken("\"robot\":{", holds).contains("cannot hold the Fridge"));
@@ -104,15 +104,18 @@ fn a_task_gets_a_scene_where_it_is_possible_and_not_yet_done() {
 fn a_task_that_makes_no_sense_gets_one_clear_sentence() {
     for (task, reason) in [
         ("", "it is empty"),
-        ("cleen Mug Sink", "\"cleen\" is no form of task; the nearest is clean"),
-        ("clean Mug", "clean takes 2 things, this has 1"),
+        ("cleen Mug Sink", "\"cleen\" is not a form of task; the nearest is clean"),
+        ("clean Mug", "clean takes 2 names of things, but you gave 1"),
         ("clean Mugg CounterTop", "there is no kind of thing called \"Mugg\"; the nearest is Mug"),
         ("clean Book Desk", "a Book cannot be washed"),
         ("place Sofa Bed", "a Sofa cannot be picked up"),
         ("place Mug Sofa", "a Mug does not go on a Sofa"),
-        ("cool Apple Fridge", "the thing is in the Fridge anyway then; name another place"),
-        ("look Book Fridge", "a Fridge is no lamp"),
-        ("free cellar", "\"cellar\" is no room; rooms are kitchen, living_room, bedroom, bathroom"),
+        ("cool Apple Fridge", "this task already puts the thing in the Fridge; name another place"),
+        ("look Book Fridge", "a Fridge is not a lamp"),
+        (
+            "free cellar",
+            "\"cellar\" is not a room; the rooms are kitchen, living_room, bedroom, bathroom",
+        ),
     ] {
         let error = stage(task, 1).unwrap_err();
         let StageError::Task { reason: found, known, .. } = &error else { panic!("{error}") };
@@ -139,14 +142,14 @@ fn a_scene_file_with_an_error_is_told_line_column_and_reason() {
     let thing = "room = \"kitchen\"\n[[thing]]\ntype = \"Mug\"\n";
     let (line, column, reason) = fails(&format!("{thing}on = \"CounterTop\""));
     assert_eq!((line, column), (4, 6));
-    assert_eq!(reason, "there is no \"CounterTop\" among the things further up");
+    assert_eq!(reason, "there is no \"CounterTop\" among the things above it");
     let (line, _, reason) = fails(&format!("{thing}states = [\"asleep\"]"));
     assert_eq!(line, 4);
-    assert!(reason.contains("is no state; expected open, closed"), "{reason}");
+    assert!(reason.contains("is not a state; expected open, closed"), "{reason}");
     let two = "[[thing]]\ntype = \"Desk\"\n[[thing]]\ntype = \"Pen\"\non = \"Desk\"\nat = [1, 2]";
     let (line, column, reason) = fails(&format!("room = \"bedroom\"\n{two}"));
     assert_eq!((line, column), (7, 6));
-    assert_eq!(reason, "a thing in or on another is where that is; leave out `at`");
+    assert_eq!(reason, "a thing in or on another one has the same place; leave out `at`");
     let (_, _, reason) = fails(&format!("{thing}states = [\"open\"]"));
     assert_eq!(reason, "a Mug cannot be open");
     let (line, _, reason) = fails("room = \"kitchen\"\ncolour = 1");
@@ -154,7 +157,7 @@ fn a_scene_file_with_an_error_is_told_line_column_and_reason() {
     assert!(reason.contains("unknown field"), "{reason}");
     let (line, column, _) = fails("room = \"kitchen\" # ä\n[[thing]]\ntype = [");
     assert_eq!((line, column > 0), (3, true));
-    assert!(fails(&" ".repeat(300_000)).2.contains("at most"));
+    assert!(fails(&" ".repeat(300_000)).2.contains("the limit is"));
 }
 
 #[test]

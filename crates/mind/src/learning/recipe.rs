@@ -295,7 +295,7 @@ fn check_name(name: &str) -> Result<(), String> {
     if (1..=64).contains(&name.len()) && name.chars().all(plain) {
         return Ok(());
     }
-    Err(format!("{name:?} is no name: expected 1 to 64 letters, digits, hyphens or underscores"))
+    Err(format!("{name:?} is not a name: expected 1 to 64 letters, digits, hyphens or underscores"))
 }
 
 fn at(toml: &str, start: usize, reason: String) -> RecipeError {
