@@ -133,7 +133,7 @@ for line in sys.stdin:
 #[test]
 fn the_reader_in_python_judges_every_vector_and_every_damaged_one_alike() {
     use std::io::Write;
-    let Some(python) = python() else { return };
+    let Some(python) = python("cryptography") else { return };
     let work = tempfile::tempdir().unwrap();
     let (mut lines, mut wanted) = (String::new(), Vec::new());
     let mut ask = |name: String, proof: &[u8], since: Option<&[u8]>| {
@@ -190,7 +190,7 @@ fn the_reader_in_python_judges_every_vector_and_every_damaged_one_alike() {
 
 #[test]
 fn the_reader_in_python_runs_by_itself() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("cryptography") else { return };
     let run = |name: &str, key: &str| {
         let mut command = Command::new(&python);
         command.arg("-B").arg(root().join("tools/verify.py")).current_dir(folder());

@@ -2,6 +2,7 @@
 
 #[path = "../support"]
 mod support {
+    pub mod python;
     pub mod toy;
     pub mod value;
 }
