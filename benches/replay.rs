@@ -3,7 +3,6 @@
 //! The real household and the recipe `default`; the log is sled's, on the disk that `target/` is on.
 
 #[path = "../tests/support/diary.rs"]
-#[allow(dead_code)]
 mod diary;
 
 use std::path::Path;

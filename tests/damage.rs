@@ -2,8 +2,9 @@
 //! recorded, or somebody is told. `APPRENTICE_FLIPS` and `APPRENTICE_SEED` give another
 //! number and repeat a run.
 
-#[path = "support/chance.rs"]
-mod chance;
+mod support {
+    pub mod chance;
+}
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,7 +19,7 @@ use apprentice::events::{Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId, UserId};
 use apprentice::store::conformance::{batch, stream};
 use apprentice::store::{Found, OpenError, Origin, SeededEntropy, open};
-use chance::{below, number, seed};
+use support::chance::{below, number, seed};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
 const FLIPS: u64 = 2_000;

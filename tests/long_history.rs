@@ -1,7 +1,10 @@
 //! Fifty thousand records of one person: waking, looking back and auditing hold a few of them in
 //! memory, never all.
 
-mod support;
+mod support {
+    pub mod diary;
+    pub mod toy;
+}
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;

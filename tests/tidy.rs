@@ -1,5 +1,6 @@
 //! The map must be the territory: the two tables of `ARCHITECTURE.md` are read from that file and
-//! every `use` in `src/` is held against them. A change to a table is a design change.
+//! every `use` in `src/` is held against them. A change to a table is a design change. The tables of
+//! `tests/README.md` are compared with the tests that there are.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -286,7 +287,7 @@ fn every_room_and_every_link_of_the_map_exists() {
 #[test]
 fn links_between_pages_lead_somewhere() {
     let mut pages = vec![];
-    for folder in ["", "docs", "docs/adr", "deploy", "schema"] {
+    for folder in ["", "docs", "docs/adr", "deploy", "schema", "tests"] {
         let Ok(entries) = fs::read_dir(root().join(folder)) else { continue };
         let paths = entries.map(|entry| entry.unwrap().path());
         pages.extend(paths.filter(|path| path.extension().is_some_and(|e| e == "md")));
@@ -305,6 +306,59 @@ fn links_between_pages_lead_somewhere() {
         }
     }
     assert!(dead.is_empty(), "{}", dead.join("\n"));
+}
+
+/// The names of what lies in a folder, without the ending `.rs`; folders of code have one, too.
+fn modules_in(folder: &Path) -> BTreeSet<String> {
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let code = paths.filter(|path| {
+        path.extension().is_some_and(|ending| ending == "rs") || head_of(path).is_some()
+    });
+    code.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect()
+}
+
+/// The file of a folder that declares the modules in it.
+fn head_of(folder: &Path) -> Option<PathBuf> {
+    ["main.rs", "mod.rs"].map(|name| folder.join(name)).into_iter().find(|path| path.is_file())
+}
+
+#[test]
+fn every_test_module_is_compiled_and_has_its_line() {
+    let tests = root().join("tests");
+    let page = read(&tests.join("README.md"));
+    let section = |title: &str| page.split("\n## ").find(|part| part.lines().next() == Some(title));
+    let lines = |section: &str| -> BTreeSet<String> {
+        let rows = section.lines().filter_map(|line| line.strip_prefix("| `"));
+        rows.map(|row| row.split('`').next().unwrap().to_owned()).collect()
+    };
+    let mut alone = BTreeSet::new();
+    for executable in modules_in(&tests) {
+        let folder = tests.join(&executable);
+        match section(&executable) {
+            None => drop(alone.insert(executable)),
+            Some(section) => {
+                let mut modules = modules_in(&folder);
+                modules.remove("main");
+                assert_eq!(lines(section), modules, "tests/README.md and tests/{executable}/");
+            }
+        }
+    }
+    let own = section("Executables of their own").expect("the page has their section");
+    assert_eq!(lines(own), alone, "tests/README.md and the executables of their own");
+
+    // A file that nobody declares would never be run.
+    let mut waiting = vec![tests];
+    while let Some(folder) = waiting.pop() {
+        let paths = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        waiting.extend(paths.filter(|path| path.is_dir()));
+        let Some(head) = head_of(&folder) else { continue };
+        let declared = strip(&read(&head));
+        for module in modules_in(&folder) {
+            let is_head = folder.join(format!("{module}.rs")) == head;
+            let fine = is_head || declared.contains(&format!("mod {module};"));
+            assert!(fine, "{} does not declare {module}", head.display());
+        }
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What every backend of [`EventLog`] must do. One suite; `tests/log_conformance.rs` runs it for
+//! What every backend of [`EventLog`] must do. One suite; `tests/store/log_conformance.rs` runs it for
 //! each backend we have, and whoever adds one runs it for theirs.
 
 use std::sync::Arc;

@@ -2,12 +2,13 @@
 //! inside. Promises and figures stand in `docs/reliability.md`; `cargo xtask crash` and
 //! `cargo xtask powerloss` run as many rounds as wanted.
 
-#[path = "../support/chance.rs"]
-mod chance;
 #[path = "../simulation/dice.rs"]
 mod dice;
-#[path = "../support/mod.rs"]
-mod support;
+#[path = "../support"]
+mod support {
+    pub mod chance;
+    pub mod toy;
+}
 
 mod bounds;
 mod crash;
@@ -20,7 +21,7 @@ mod people;
 mod power;
 mod served;
 
-use chance::{number, seed};
+use support::chance::{number, seed};
 
 #[test]
 fn whenever_it_is_killed_every_acknowledgement_is_found_again() {

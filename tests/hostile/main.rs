@@ -2,20 +2,16 @@
 //! writer wrote. Each case gets a typed error or a value, never a panic, and takes a bounded amount
 //! of memory. `cargo xtask fuzz --cases N --seed S` runs as many as wanted.
 
-#[path = "../support/chance.rs"]
-mod chance;
-#[path = "../support/diary.rs"]
-#[allow(dead_code)]
-mod diary;
 #[path = "../simulation/dice.rs"]
 #[allow(dead_code)]
 mod dice;
-#[path = "../golden/samples.rs"]
-#[allow(dead_code)]
-mod samples;
-#[path = "../support/toy.rs"]
-#[allow(dead_code)]
-mod toy;
+#[path = "../support"]
+mod support {
+    pub mod chance;
+    pub mod diary;
+    pub mod samples;
+    pub mod toy;
+}
 
 mod memory;
 mod mutate;
@@ -23,7 +19,7 @@ mod process;
 mod socket;
 mod targets;
 
-use chance::{number, seed};
+use support::chance::{number, seed};
 
 #[global_allocator]
 static MEMORY: memory::Counting = memory::Counting;

@@ -13,7 +13,8 @@ use apprentice::world::Stage;
 
 use crate::dice::Dice;
 use crate::mutate::mutate;
-use crate::{targets, toy};
+use crate::support::toy;
+use crate::targets;
 
 /// Messages before the answers to all of them are awaited.
 const WINDOW: usize = 50;

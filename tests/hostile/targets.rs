@@ -26,8 +26,8 @@ use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Domain, Stage};
 
-use crate::diary::Diary;
-use crate::samples::samples;
+use crate::support::diary::Diary;
+use crate::support::samples::samples;
 
 /// Says whether the bytes were read; a refusal is as good.
 pub type Decoder = dyn Fn(&[u8]) -> bool + Send + Sync;

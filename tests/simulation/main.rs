@@ -7,8 +7,10 @@
 
 #[path = "../support/chance.rs"]
 mod chance;
-#[path = "../support/mod.rs"]
-mod support;
+#[path = "../support"]
+mod support {
+    pub mod toy;
+}
 
 mod counts;
 mod defects;

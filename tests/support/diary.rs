@@ -1,4 +1,5 @@
 //! One person's life, written by hand into any store: what the actor does, without actors.
+#![allow(dead_code)]
 
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
 //! A world of three bells, for tests that are about the service and not about the household: it
 //! trains in no time, and proves that nothing outside `world/` knows about mugs.
+#![allow(dead_code)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

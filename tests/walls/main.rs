@@ -78,14 +78,13 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
 
 /// The decrypted records of one tenant, as the command writes them, and what it says about it.
 fn exported(dir: &std::path::Path, name: &str) -> Vec<u8> {
-    let out = dir.join(format!("../{name}.ndjson"));
-    let out = out.as_path();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("people.ndjson");
     let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
     command.args(["export", "--ndjson", "--tenant", name, "--data"]).arg(dir);
-    let output = command.arg("--out").arg(out).output().unwrap();
+    let output = command.arg("--out").arg(&out).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = std::fs::read(out).unwrap();
-    std::fs::remove_file(out).unwrap();
     [text, output.stdout, output.stderr].concat()
 }
 

@@ -1,0 +1,256 @@
+//! What clocks cannot do, through the doors of a service whose clock the test sets: no jump of it
+//! lets a retired key in, and no time in the log is taken for what a clock read.
+
+use std::path::{Path, PathBuf};
+use std::process;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::support::toy::config;
+use apprentice::actors::{ErrorCode, KeyView};
+use apprentice::frontends::{Client, ClientError, CurveKey, Identity};
+use apprentice::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
+use apprentice::service::{Data, Service};
+use apprentice::store;
+use apprentice::tenancy::{Clock, Order, Role};
+use apprentice::world::Stage;
+
+/// Seconds since 1970, some day in 2026.
+const TODAY: u64 = 1_790_000_000;
+const DAY: u64 = 24 * 60 * 60;
+const YEARS: u64 = 10 * 365 * DAY;
+
+/// A lab with a directory, and a clock that is set by hand.
+struct House {
+    folder: tempfile::TempDir,
+    wall: Arc<AtomicU64>,
+    key: CurveKey,
+    service: Option<Service>,
+}
+
+fn lab() -> TenantId {
+    TenantId::new("lab").unwrap()
+}
+
+fn user(name: &str) -> UserId {
+    UserId::new(name).unwrap()
+}
+
+impl House {
+    /// With one gateway key, admitted at `seconds`.
+    fn new(seconds: u64) -> House {
+        let (folder, key) = (tempfile::tempdir().unwrap(), CurveKey::new().unwrap());
+        let wall = Arc::new(AtomicU64::new(seconds));
+        let mut house = House { folder, wall, key, service: None };
+        house.start(seconds);
+        let admit = Order::Admit {
+            key: *house.key.public(),
+            role: Role::Gateway,
+            label: "robot".to_owned(),
+        };
+        assert_eq!((house.order(Order::Open), house.order(admit)), (1, 1));
+        house
+    }
+
+    fn at(&self, seconds: u64) {
+        self.wall.store(seconds, Ordering::SeqCst);
+    }
+
+    fn directory(&self) -> PathBuf {
+        self.folder.path().join("data")
+    }
+
+    /// Starts the service, or starts it anew, with the clock at `seconds`.
+    fn start(&mut self, seconds: u64) {
+        self.stop();
+        self.at(seconds);
+        let wall = self.wall.clone();
+        let mut config = config(Data::Directory(self.directory()));
+        config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+        config.clock = Clock::new(move || Timestamp(wall.load(Ordering::SeqCst) * 1_000_000));
+        self.service = Some(Service::start(config).unwrap());
+    }
+
+    fn stop(&mut self) {
+        if let Some(service) = self.service.take() {
+            service.stop().unwrap();
+        }
+    }
+
+    fn service(&self) -> &Service {
+        self.service.as_ref().unwrap()
+    }
+
+    /// The single user of this machine, who may give all orders.
+    fn operator(&self) -> Client {
+        self.service().connect(user("operator")).unwrap()
+    }
+
+    /// - returns: how many records it led to.
+    fn order(&self, order: Order) -> u32 {
+        self.operator().order(Some(lab()), order).unwrap().recorded
+    }
+
+    fn retire(&self, overlap_seconds: u64) -> u32 {
+        self.order(Order::Retire { key: *self.key.public(), overlap_seconds })
+    }
+
+    fn view(&self) -> KeyView {
+        self.operator().tenants(Some(lab())).unwrap()[0].keys[0].clone()
+    }
+
+    /// A new connection with the lab's key.
+    fn connect(&self) -> Client {
+        let server = *self.service().server_key().unwrap();
+        let identity = Identity { key: self.key.clone(), server };
+        Client::connect_as(&self.service().curve_endpoints()[0], user("ada"), identity).unwrap()
+    }
+
+    /// Neither an open connection nor a new one is served.
+    fn shut(&self, open: &Client) {
+        match open.status() {
+            Err(ClientError::Failed { code: ErrorCode::Denied, .. }) => {}
+            other => panic!("an open connection is served: {other:?}"),
+        }
+        self.shut_to_new();
+    }
+
+    fn shut_to_new(&self) {
+        let error = self.connect().hello().unwrap_err();
+        assert!(matches!(error, ClientError::NotAdmitted { .. }), "{error}");
+        assert!(self.view().retired);
+    }
+}
+
+#[test]
+fn a_retired_key_stays_out_when_the_clock_is_set_back_before_and_after_a_restart() {
+    let mut house = House::new(TODAY);
+    let open = house.connect();
+    open.hello().unwrap();
+    house.at(TODAY + 5);
+    assert_eq!(house.retire(0), 1);
+    house.shut(&open);
+    house.at(TODAY - DAY);
+    house.shut(&open);
+    assert_eq!(house.retire(0), 0);
+    for seconds in [TODAY - DAY, TODAY + 3, 0, TODAY + YEARS] {
+        house.start(seconds);
+        house.shut_to_new();
+    }
+}
+
+#[test]
+fn an_overlap_that_was_seen_to_end_stays_ended_and_a_later_record_tells_the_next_process() {
+    let mut house = House::new(TODAY);
+    let open = house.connect();
+    assert_eq!(house.retire(60), 1);
+    house.at(TODAY + 59);
+    open.hello().unwrap();
+    house.connect().hello().unwrap();
+    assert!(!house.view().retired);
+    house.at(TODAY + 60);
+    house.shut(&open);
+    house.at(TODAY + 30);
+    house.shut(&open);
+    // Something that has nothing to do with the key is recorded after its end.
+    house.at(TODAY + 61);
+    house.order(Order::Disable { reason: "a pause".to_owned() });
+    house.order(Order::Enable);
+    house.start(TODAY + 30);
+    house.shut_to_new();
+}
+
+#[test]
+fn a_clock_set_back_before_an_overlap_began_ends_it() {
+    let mut house = House::new(TODAY);
+    let open = house.connect();
+    open.hello().unwrap();
+    house.retire(60);
+    house.at(TODAY - 1);
+    house.shut(&open);
+    // What is recorded now has a held time; a record says what the clock read.
+    assert_eq!(house.order(Order::Disable { reason: "a pause".to_owned() }), 2);
+    house.order(Order::Enable);
+    house.start(TODAY + 30);
+    house.shut_to_new();
+}
+
+#[test]
+fn a_clock_that_ran_ahead_once_keeps_no_key_and_its_overlaps_are_real_seconds() {
+    let house = House::new(TODAY + YEARS);
+    house.at(TODAY);
+    let open = house.connect();
+    open.hello().unwrap();
+    assert_eq!(house.retire(0), 1);
+    house.shut(&open);
+
+    let mut house = House::new(TODAY + YEARS);
+    house.at(TODAY);
+    let open = house.connect();
+    assert_eq!(house.retire(60), 1);
+    house.at(TODAY + 59);
+    open.hello().unwrap();
+    house.at(TODAY + 60);
+    house.shut(&open);
+    house.start(TODAY + 60);
+    house.shut_to_new();
+}
+
+#[test]
+fn a_shorter_overlap_takes_effect_and_one_beyond_the_bound_is_refused() {
+    let house = House::new(TODAY);
+    let open = house.connect();
+    let forever = Order::Retire { key: *house.key.public(), overlap_seconds: u64::MAX };
+    let refused = house.operator().order(Some(lab()), forever).unwrap_err().to_string();
+    assert!(refused.contains("at most 2592000 seconds (30 days)"), "{refused}");
+    assert_eq!(house.retire(1_000), 1);
+    assert_eq!(house.retire(2_000), 0);
+    open.hello().unwrap();
+    assert_eq!(house.retire(10), 1);
+    house.at(TODAY + 10);
+    house.shut(&open);
+}
+
+/// Runs a command that goes well.
+fn said(arguments: &[&str], data: &Path) -> String {
+    let output = process::Command::new(env!("CARGO_BIN_EXE_apprentice"))
+        .args(arguments)
+        .arg("--data")
+        .arg(data)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn the_log_shows_which_times_were_held() {
+    const HELD: &str = "time held: the clock did not move forward";
+    let mut house = House::new(TODAY);
+    let ada = house.service().connect(user("ada")).unwrap();
+    ada.start(Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }).unwrap();
+    house.at(TODAY + 7);
+    ada.say("ring the brass bell").unwrap();
+    house.at(TODAY - DAY);
+    ada.say("ring the brass bell").unwrap();
+    house.at(TODAY + 9);
+    ada.say("ring the brass bell").unwrap();
+    house.stop();
+
+    let shown = said(&["log", "show", "--user", "ada"], &house.directory());
+    let lines: Vec<&str> = shown.lines().collect();
+    let said = (0..lines.len()).filter(|&at| lines[at].contains(" Interpreted "));
+    let held: Vec<bool> = said.map(|at| lines[at + 1].trim() == HELD).collect();
+    assert_eq!(held, [false, true, false], "{shown}");
+
+    // Times never run backwards, in a tenant's own stream neither.
+    let store = store::open(&house.directory()).unwrap();
+    for stream in [
+        store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap(),
+        StreamId::of_tenant(&lab()),
+    ] {
+        let records = store.log.read(&stream, Seq::FIRST).unwrap();
+        let records: Vec<_> = records.map(Result::unwrap).collect();
+        assert!(records.windows(2).all(|two| two[0].at <= two[1].at), "{stream}");
+    }
+}

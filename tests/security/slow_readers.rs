@@ -1,0 +1,328 @@
+//! Clients that do not read cannot fill the memory: connections that ask and take no answer, subscribers
+//! that ask for everything, connections without number. Real sockets; the program as people start
+//! it, whose memory is measured from outside.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command as Process, Stdio};
+use std::time::{Duration, Instant};
+
+use apprentice::actors::{ArchiveAsk, Ask, DoorAsk, PersonAsk, Response};
+use apprentice::frontends::wire::{Request, decode_response, encode_request};
+use apprentice::frontends::{Client, CurveKey, Follower, Identity, fresh_id, read_public};
+use apprentice::ids::{PublicKey, Seq, StreamKey, TenantId, UserId};
+use apprentice::limits::{KEY_CONNECTIONS_MAX, TOPICS_MAX};
+use apprentice::service::{Data, Service};
+use apprentice::session::Query;
+use apprentice::tenancy::{Order, Role};
+use apprentice::world::Stage;
+
+use crate::support::toy;
+
+/// What a test may take, hung or not.
+const BOUND: Duration = Duration::from_secs(60);
+/// What the service says when it drops what nobody reads.
+const DROPS: &str = "a tenant's connections do not read";
+/// How long the hostile ones go on.
+const FLOOD: Duration = Duration::from_secs(5);
+/// Megabytes by which the process may grow meanwhile.
+const GROWTH_MAX: f64 = 64.0;
+
+fn lab(name: &str) -> TenantId {
+    TenantId::new(name).unwrap()
+}
+
+fn user(name: &str) -> UserId {
+    UserId::new(name).unwrap()
+}
+
+/// The program, serving from a directory of its own.
+struct Served {
+    child: Child,
+    open: String,
+    locked: String,
+    server: PublicKey,
+    said: PathBuf,
+    _dir: tempfile::TempDir,
+}
+
+impl Served {
+    fn start() -> Served {
+        let dir = tempfile::tempdir().unwrap();
+        let said = dir.path().join("said");
+        let mut process = Process::new(env!("CARGO_BIN_EXE_apprentice"));
+        process.args(["serve", "--zmq", "tcp://127.0.0.1:0", "--curve", "tcp://127.0.0.1:0"]);
+        process.args(["--feed", "tcp://127.0.0.1:0", "--data"]).arg(dir.path().join("lab"));
+        process.env_remove("APPRENTICE_LOG").stdout(Stdio::piped());
+        let mut child = process.stderr(File::create(&said).unwrap()).spawn().unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let mut after = |words: &str| loop {
+            let line = lines.next().expect("the program says where it serves").unwrap();
+            if let Some(rest) = line.strip_prefix(words) {
+                return rest.to_owned();
+            }
+        };
+        let (open, locked) = (after("serving at "), after("serving with keys at "));
+        let server = read_public(&after("server key ")).unwrap();
+        Served { child, open, locked, server, said, _dir: dir }
+    }
+
+    /// A key of a lab, which is made if it is not there.
+    fn admit(&self, name: &str, role: Role) -> CurveKey {
+        let (host, key) =
+            (Client::connect(&self.open, user("host")).unwrap(), CurveKey::new().unwrap());
+        let admit = Order::Admit { key: *key.public(), role, label: String::new() };
+        for order in [Order::Open, admit] {
+            host.order(Some(lab(name)), order).unwrap();
+        }
+        key
+    }
+
+    fn identity(&self, key: &CurveKey) -> Identity {
+        Identity { key: key.clone(), server: self.server }
+    }
+
+    fn connect(&self, key: &CurveKey, name: &str) -> Client {
+        Client::connect_as(&self.locked, user(name), self.identity(key)).unwrap()
+    }
+
+    /// Megabytes that the process holds.
+    fn memory_mb(&self) -> f64 {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
+        let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
+        let kb: f64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+        kb / 1024.0
+    }
+
+    /// Whether the flood goes on: for its time, and on a busy machine until something was dropped.
+    fn is_flooded_since(&self, start: Instant) -> bool {
+        let flooded = start.elapsed();
+        flooded < FLOOD || (flooded < BOUND && !self.said().contains(DROPS))
+    }
+
+    fn said(&self) -> String {
+        fs::read_to_string(&self.said).unwrap()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A socket that asks and takes next to nothing of what comes back.
+fn deaf(context: &zmq::Context, endpoint: &str, identity: Option<&Identity>) -> zmq::Socket {
+    let socket = context.socket(zmq::DEALER).unwrap();
+    socket.set_linger(0).unwrap();
+    socket.set_rcvhwm(1).unwrap();
+    socket.set_rcvbuf(4096).unwrap();
+    identity.iter().for_each(|identity| identity.put_on(&socket).unwrap());
+    socket.connect(endpoint).unwrap();
+    socket
+}
+
+fn request(name: &str, ask: Ask) -> Vec<u8> {
+    encode_request(&Request { id: fresh_id(), user: user(name), ask })
+}
+
+/// A kitchen with as many things as a scene has at most.
+fn large_stage() -> Stage {
+    let thing = |name: &str| format!("[[thing]]\ntype = \"{name}\"\non = \"CounterTop\"\n");
+    let things: String = (0..390).map(|n| thing(["Mug", "Apple", "Tomato"][n % 3])).collect();
+    let room =
+        "room = \"kitchen\"\n[[thing]]\ntype = \"CounterTop\"\n[[thing]]\ntype = \"SinkBasin\"\n";
+    let scene = format!("{room}{things}");
+    Stage::Scene { scene, task: "place Mug SinkBasin".to_owned() }
+}
+
+/// Records enough for the largest answer that `records` gives.
+///
+/// - returns: whose they are.
+fn record_much(client: &Client, reader: &Client) -> StreamKey {
+    loop {
+        client.start(large_stage()).unwrap();
+        client.done().unwrap();
+        let heads = reader.heads().unwrap();
+        let longest = heads.iter().max_by_key(|head| head.seq).unwrap().stream;
+        if reader.records(longest, Seq::FIRST).unwrap().more {
+            return longest;
+        }
+    }
+}
+
+/// Milliseconds of the slowest of a hundred of a quiet lab's questions.
+fn p99_ms(client: &Client, asked: usize) -> f64 {
+    let mut times: Vec<Duration> = (0..asked)
+        .map(|_| {
+            let start = Instant::now();
+            client.status().unwrap();
+            start.elapsed()
+        })
+        .collect();
+    times.sort_unstable();
+    times[asked * 99 / 100].as_secs_f64() * 1_000.0
+}
+
+#[test]
+fn eight_connections_that_take_no_answer_cost_bounded_memory_and_nobody_elses_time() {
+    let served = Served::start();
+    let [gateway, auditor] = [Role::Gateway, Role::Auditor].map(|role| served.admit("loud", role));
+    let quiet = served.connect(&served.admit("quiet", Role::Gateway), "ada");
+    let (bob, reader) = (served.connect(&gateway, "bob"), served.connect(&auditor, "reader"));
+    let stream = record_much(&bob, &reader);
+    let alone_ms = p99_ms(&quiet, 200);
+
+    let context = zmq::Context::new();
+    let identity = served.identity(&auditor);
+    let deaf: Vec<_> = (0..8).map(|_| deaf(&context, &served.locked, Some(&identity))).collect();
+    let (before, mut most, mut times) = (served.memory_mb(), 0f64, Vec::new());
+    let start = Instant::now();
+    while served.is_flooded_since(start) {
+        for socket in &deaf {
+            for _ in 0..20 {
+                let ask = ArchiveAsk::Sealed { stream, from: Seq::FIRST, limit: 256 };
+                // A queue that is full is as good: they are not to run out of requests.
+                let _ = socket.send(request("reader", Ask::Archive(ask)), zmq::DONTWAIT);
+            }
+        }
+        times.push(p99_ms(&quiet, 100));
+        most = most.max(served.memory_mb() - before);
+    }
+    times.sort_by(f64::total_cmp);
+    let beside_ms = times[times.len() / 2];
+    println!(
+        "grew by {most:.0} MB in {FLOOD:?}; another lab's p99 {alone_ms:.2} ms alone, {beside_ms:.2} ms beside"
+    );
+    assert!(most <= GROWTH_MAX, "the process grew by {most:.0} MB");
+    assert!(served.said().contains(DROPS), "drops are told of");
+    // Those of the same lab who do read are answered, while the others still do not.
+    assert!(bob.status().unwrap().seq > 0);
+    drop(deaf);
+    // What waited for them is given back.
+    assert!(reader.records(stream, Seq::FIRST).unwrap().more);
+}
+
+#[test]
+fn a_door_without_keys_is_bounded_in_the_same_way() {
+    let served = Served::start();
+    let ada = Client::connect(&served.open, user("ada")).unwrap();
+    ada.start(large_stage()).unwrap();
+    let context = zmq::Context::new();
+    let deaf: Vec<_> = (0..8).map(|_| deaf(&context, &served.open, None)).collect();
+    let (before, mut most) = (served.memory_mb(), 0f64);
+    let start = Instant::now();
+    while served.is_flooded_since(start) {
+        for socket in &deaf {
+            for query in [Query::Known, Query::Look] {
+                let _ = socket
+                    .send(request("ada", Ask::Person(PersonAsk::Query(query))), zmq::DONTWAIT);
+            }
+        }
+        ada.hello().unwrap();
+        most = most.max(served.memory_mb() - before);
+    }
+    println!("grew by {most:.0} MB in {FLOOD:?}");
+    assert!(most <= GROWTH_MAX, "the process grew by {most:.0} MB");
+    assert!(served.said().contains(DROPS), "drops are told of");
+}
+
+#[test]
+fn a_subscriber_that_asks_for_everything_is_cut_off_and_the_others_follow_on() {
+    let served = Served::start();
+    let [gateway, good, bad] =
+        [Role::Gateway, Role::Auditor, Role::Auditor].map(|role| served.admit("lab", role));
+    let ada = served.connect(&gateway, "ada");
+    let mut follower = Follower::sealed(served.connect(&good, "good"), Default::default());
+    ada.start(large_stage()).unwrap();
+    let door = served.connect(&bad, "bad");
+    let end = Instant::now() + BOUND;
+    let feed = loop {
+        match door.feed().unwrap().sealed {
+            Some(endpoint) => break endpoint,
+            None => assert!(Instant::now() < end, "no feed within {BOUND:?}"),
+        }
+    };
+    let hostile = zmq::Context::new().socket(zmq::XSUB).unwrap();
+    hostile.set_linger(0).unwrap();
+    hostile.set_sndhwm(0).unwrap();
+    served.identity(&bad).put_on(&hostile).unwrap();
+    hostile.connect(&feed).unwrap();
+    let (before, mut most, mut asked) = (served.memory_mb(), 0f64, 0u64);
+    let start = Instant::now();
+    while start.elapsed() < FLOOD {
+        for _ in 0..500 {
+            asked += 1;
+            let topic = [&[1], &asked.to_le_bytes()[..], &[7; 200]].concat();
+            hostile.send(topic, zmq::DONTWAIT).unwrap();
+        }
+        most = most.max(served.memory_mb() - before);
+        std::thread::yield_now();
+    }
+    println!("{asked} topics; grew by {most:.0} MB in {FLOOD:?}");
+    assert!(asked as usize > 10 * TOPICS_MAX);
+    assert!(most <= GROWTH_MAX, "the process grew by {most:.0} MB");
+    assert!(served.said().contains("subscribed to too many topics"), "it is told of");
+    // The others miss nothing.
+    let last = ada.done().unwrap().last;
+    let end = Instant::now() + BOUND;
+    while !follower.positions().values().any(|position| position.seq >= last) {
+        assert!(Instant::now() < end, "not everything within {BOUND:?}");
+        follower.next(Duration::from_millis(200)).unwrap();
+    }
+}
+
+/// A service of bells with a door for keys, and a gateway's key of a lab.
+fn bells() -> (Service, CurveKey) {
+    let mut config = toy::config(Data::Memory);
+    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+    let (service, key) = (Service::start(config).unwrap(), CurveKey::new().unwrap());
+    let admit = Order::Admit { key: *key.public(), role: Role::Gateway, label: String::new() };
+    for order in [Order::Open, admit] {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        service.registrar().order(lab("lab"), order, move |obeyed| sender.send(obeyed).unwrap());
+        receiver.recv_timeout(BOUND).unwrap().unwrap();
+    }
+    (service, key)
+}
+
+#[test]
+fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
+    let (service, key) = bells();
+    let context = zmq::Context::new();
+    let identity = Identity { key, server: *service.server_key().unwrap() };
+    let connect = || {
+        let socket = context.socket(zmq::DEALER).unwrap();
+        socket.set_linger(0).unwrap();
+        identity.put_on(&socket).unwrap();
+        socket.connect(&service.curve_endpoints()[0]).unwrap();
+        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
+        socket
+    };
+    let is_answered = |socket: &zmq::Socket, patience: Duration| {
+        let answered = socket.poll(zmq::POLLIN, patience.as_millis() as i64).unwrap() == 1;
+        if answered {
+            let (_, response) = decode_response(&socket.recv_bytes(0).unwrap()).unwrap();
+            assert!(matches!(response, Response::Hello(_)), "{response:?}");
+        }
+        answered
+    };
+    let mut sockets: Vec<_> = (0..KEY_CONNECTIONS_MAX).map(|_| connect()).collect();
+    assert!(sockets.iter().all(|socket| is_answered(socket, BOUND)));
+    let one_more = connect();
+    let end = Instant::now() + BOUND;
+    while service.counts().handshakes_crowded == 0 {
+        assert!(Instant::now() < end, "it is counted");
+        std::thread::yield_now();
+    }
+    assert!(!is_answered(&one_more, Duration::ZERO));
+    // ZeroMQ tries again by itself.
+    sockets.truncate(KEY_CONNECTIONS_MAX - 1);
+    assert!(is_answered(&one_more, BOUND), "there is room again");
+    for socket in &sockets {
+        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
+        assert!(is_answered(socket, BOUND), "nobody else was cut off");
+    }
+}
