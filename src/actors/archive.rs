@@ -248,7 +248,7 @@ impl Reader {
 /// A thread that answers questions about the log. Those of one tenant wait behind their own, not
 /// others' behind theirs.
 #[derive(Clone)]
-pub(super) struct Archive(Arc<Desk>);
+pub(super) struct Archive(Arc<Questions>);
 
 /// A question about the log.
 pub(super) struct Question {
@@ -257,7 +257,7 @@ pub(super) struct Question {
     pub answer: AnswerTo,
 }
 
-struct Desk {
+struct Questions {
     waiting: Mutex<Waiting>,
     changed: Condvar,
 }
@@ -273,8 +273,8 @@ impl Archive {
     pub fn start(reader: Reader, open: Awake) -> std::io::Result<Archive> {
         let room = Room::new(ARCHIVE_QUEUE_MAX);
         let waiting = Mutex::new(Waiting { turns: Turns::default(), room, closed: false });
-        let desk = Arc::new(Desk { waiting, changed: Condvar::new() });
-        let serving = desk.clone();
+        let questions = Arc::new(Questions { waiting, changed: Condvar::new() });
+        let serving = questions.clone();
         thread::Builder::new().name("archive".to_owned()).spawn(move || {
             let _open = open;
             let reader = reader;
@@ -282,7 +282,7 @@ impl Archive {
                 answer.send(reader.answer(&tenant, ask));
             }
         })?;
-        Ok(Archive(desk))
+        Ok(Archive(questions))
     }
 
     /// - errors: the way back, when the tenant has too many here already, or nobody answers.
@@ -308,7 +308,7 @@ impl Archive {
     }
 }
 
-impl Desk {
+impl Questions {
     fn next(&self) -> Option<Question> {
         let mut waiting = self.waiting();
         loop {

@@ -3,14 +3,12 @@
 
 mod archive;
 mod awake;
-mod book;
 mod clock;
 mod defect;
 mod directory;
 mod failure;
-mod growth;
-mod house;
 mod meters;
+mod notifications;
 mod operator;
 mod presence;
 mod registrar;
@@ -18,21 +16,21 @@ mod response;
 mod seat;
 mod shared;
 mod submit;
+mod system;
+mod tenant_registry;
 mod trainer;
 mod user;
 
 pub use archive::{
     ArchiveAsk, Frame, HeadView, Heads, PlainRecords, PlainView, Reader, SealedRecords, SealedView,
 };
-pub use book::{Book, OrderError, fold as fold_tenant};
 pub use clock::wall_clock;
 pub use directory::{
     Directory, DirectoryEffect, DirectoryInput, Letter, NotDelivered, Undelivered,
 };
 pub use failure::{Alarm, Failure};
-pub use growth::{Growth, Growths};
-pub use house::{ActorsError, Front, House, HouseSettings, NotTaken, Wakings};
 pub use meters::{Refusals, Usage};
+pub use notifications::{CommitNotification, CommitNotifications};
 pub use operator::{ErasedView, KeyView, Ordered, TenantAsk, TenantVerb, TenantView};
 pub use presence::{Attention, Presence};
 pub use registrar::{Erased, Obeyed, Registrar, Signed};
@@ -42,3 +40,5 @@ pub use response::{
 };
 pub use seat::{Effect, Input, NewSession, Seat, Timer};
 pub use submit::{AnswerTo, Submit};
+pub use system::{ActorSettings, ActorSystem, ActorsError, Front, NotTaken, Wakings};
+pub use tenant_registry::{OrderError, TenantRegistry, fold as fold_tenant};

@@ -6,7 +6,7 @@ use actix::{Actor, Addr, Handler, Message, SyncArbiter, SyncContext};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::awake::Awake;
-use super::{Book, Failure, OrderError};
+use super::{Failure, OrderError, TenantRegistry};
 use crate::events::{Event, PersonErased};
 use crate::ids::{StreamId, TenantId};
 use crate::limits::REGISTRAR_QUEUE_MAX;
@@ -18,7 +18,7 @@ use crate::tenancy::{Admissions, Order};
 /// after the other: it alone writes the tenants' own streams.
 #[derive(Clone)]
 pub struct Registrar {
-    address: Addr<Clerk>,
+    address: Addr<RegistrarWorker>,
     places: Arc<Semaphore>,
     admissions: Admissions,
 }
@@ -32,13 +32,13 @@ pub type Signed = Result<String, OrderError>;
 /// Seconds between two checkpoints of one tenant that nobody asked for.
 const CHECKPOINT_EVERY_S: u64 = 60;
 
-struct Clerk {
-    desk: Arc<Mutex<Desk>>,
+struct RegistrarWorker {
+    registrations: Arc<Mutex<Registrations>>,
     failure: Failure,
 }
 
-struct Desk {
-    book: Book,
+struct Registrations {
+    tenant_registry: TenantRegistry,
     /// When each tenant's tree was signed last, and whether it has grown since.
     signed: BTreeMap<TenantId, (Instant, bool)>,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
@@ -85,11 +85,21 @@ struct Erase {
 
 impl Registrar {
     /// Must run on the actix system's thread.
-    pub(super) fn start(book: Book, open: Awake, failure: Failure) -> Registrar {
-        let admissions = book.admissions().clone();
-        let desk = Arc::new(Mutex::new(Desk { book, signed: BTreeMap::new(), _open: open }));
-        let address =
-            SyncArbiter::start(1, move || Clerk { desk: desk.clone(), failure: failure.clone() });
+    pub(super) fn start(
+        tenant_registry: TenantRegistry,
+        open: Awake,
+        failure: Failure,
+    ) -> Registrar {
+        let admissions = tenant_registry.admissions().clone();
+        let registrations = Arc::new(Mutex::new(Registrations {
+            tenant_registry,
+            signed: BTreeMap::new(),
+            _open: open,
+        }));
+        let address = SyncArbiter::start(1, move || RegistrarWorker {
+            registrations: registrations.clone(),
+            failure: failure.clone(),
+        });
         Registrar { address, places: Arc::new(Semaphore::new(REGISTRAR_QUEUE_MAX)), admissions }
     }
 
@@ -136,7 +146,7 @@ impl Registrar {
         work: impl FnOnce(Way<T>, OwnedSemaphorePermit) -> M,
     ) where
         M: Message<Result = ()> + Send + 'static,
-        Clerk: Handler<M>,
+        RegistrarWorker: Handler<M>,
     {
         let answer = Answer(Some(Box::new(answer)));
         match self.places.clone().try_acquire_owned() {
@@ -174,20 +184,20 @@ impl<T> Drop for Answer<T> {
     }
 }
 
-impl Actor for Clerk {
+impl Actor for RegistrarWorker {
     type Context = SyncContext<Self>;
 }
 
-impl Desk {
+impl Registrations {
     /// Closes, and signs now and then, so that a feed of checkpoints goes on by itself.
     fn close(&mut self, stream: &StreamId) -> Result<(), OrderError> {
-        if self.book.close(stream, Through::Episodes)? == 0 {
+        if self.tenant_registry.close(stream, Through::Episodes)? == 0 {
             return Ok(());
         }
         let tenant = &stream.tenant;
         let last = self.signed.get(tenant).map(|(at, _)| *at);
         if last.is_none_or(|at| at.elapsed().as_secs() >= CHECKPOINT_EVERY_S) {
-            self.book.checkpoint(tenant)?;
+            self.tenant_registry.checkpoint(tenant)?;
             self.signed.insert(tenant.clone(), (Instant::now(), false));
         } else if let Some((_, grown)) = self.signed.get_mut(tenant) {
             *grown = true;
@@ -196,18 +206,18 @@ impl Desk {
     }
 }
 
-impl Drop for Desk {
+impl Drop for Registrations {
     /// The last checkpoint of a service covers all that it closed.
     fn drop(&mut self) {
         for (tenant, _) in self.signed.iter().filter(|(_, (_, grown))| *grown) {
-            if let Err(error) = self.book.checkpoint(tenant) {
+            if let Err(error) = self.tenant_registry.checkpoint(tenant) {
                 tracing::warn!(%tenant, %error, "no checkpoint was signed at the end");
             }
         }
     }
 }
 
-impl Clerk {
+impl RegistrarWorker {
     /// A log that is poisoned ends the service.
     fn look_at(&self, error: Option<&OrderError>) {
         if let Some(OrderError::Append { error, .. }) = error
@@ -217,16 +227,16 @@ impl Clerk {
         }
     }
 
-    fn desk(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    fn registrations(&self) -> MutexGuard<'_, Registrations> {
+        self.registrations.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Handler<Close> for Clerk {
+impl Handler<Close> for RegistrarWorker {
     type Result = ();
 
     fn handle(&mut self, close: Close, _: &mut SyncContext<Self>) {
-        let closed = self.desk().close(&close.stream);
+        let closed = self.registrations().close(&close.stream);
         if let Err(error) = closed {
             tracing::warn!(stream = %close.stream, %error, "segments are left to be closed later");
             self.look_at(Some(&error));
@@ -234,39 +244,39 @@ impl Handler<Close> for Clerk {
     }
 }
 
-impl Handler<SignTree> for Clerk {
+impl Handler<SignTree> for RegistrarWorker {
     type Result = ();
 
     fn handle(&mut self, sign: SignTree, _: &mut SyncContext<Self>) {
         let SignTree { tenant, through, answer, _place } = sign;
-        let mut desk = self.desk();
-        let signed = desk.book.sign(&tenant, through);
+        let mut registrations = self.registrations();
+        let signed = registrations.tenant_registry.sign(&tenant, through);
         if signed.is_ok() {
-            desk.signed.insert(tenant, (Instant::now(), false));
+            registrations.signed.insert(tenant, (Instant::now(), false));
         }
-        drop(desk);
+        drop(registrations);
         self.look_at(signed.as_ref().err());
         answer(signed);
     }
 }
 
-impl Handler<Obey> for Clerk {
+impl Handler<Obey> for RegistrarWorker {
     type Result = ();
 
     fn handle(&mut self, obey: Obey, _: &mut SyncContext<Self>) {
         let Obey { tenant, order, answer, _place } = obey;
-        let obeyed = self.desk().book.obey(&tenant, &order);
+        let obeyed = self.registrations().tenant_registry.obey(&tenant, &order);
         self.look_at(obeyed.as_ref().err());
         answer(obeyed);
     }
 }
 
-impl Handler<Erase> for Clerk {
+impl Handler<Erase> for RegistrarWorker {
     type Result = ();
 
     fn handle(&mut self, erase: Erase, _: &mut SyncContext<Self>) {
         let Erase { stream, answer, _place } = erase;
-        let erased = self.desk().book.erase(&stream);
+        let erased = self.registrations().tenant_registry.erase(&stream);
         self.look_at(erased.as_ref().err());
         answer(erased);
     }

@@ -8,7 +8,7 @@ use super::awake::Awake;
 use super::meters::Meters;
 use super::seat::NewSession;
 use super::trainer::{Run, Slot, Train, Trainer};
-use super::{ErrorCode, Failure, Growths, Registrar, Response};
+use super::{CommitNotifications, ErrorCode, Failure, Registrar, Response};
 use crate::events::Record;
 use crate::fairness::Trainings;
 use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
@@ -27,7 +27,7 @@ pub(super) struct Common<D: Domain> {
     pub new: Arc<NewSession>,
     pub minds: Arc<Minds>,
     pub meters: Arc<Meters>,
-    pub growths: Growths,
+    pub notifications: CommitNotifications,
     pub failure: Failure,
     // Last, so that it ends after the store was closed: fields are dropped in this order.
     pub _open: Awake,
@@ -70,8 +70,8 @@ impl<D: Domain> Shared<D> {
     }
 
     /// Who is told of what became durable.
-    pub fn growths(&self) -> &Growths {
-        &self.common.growths
+    pub fn notifications(&self) -> &CommitNotifications {
+        &self.common.notifications
     }
 
     /// What new people start with.

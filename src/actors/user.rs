@@ -110,7 +110,7 @@ impl<D: Domain> UserActor<D> {
             Effect::Answer { caller, response } => caller.send(response),
             Effect::Remember(mind) => shared.remember(&stream.tenant, mind),
             Effect::CloseSegments => shared.registrar().close(stream),
-            Effect::Publish(durable) => shared.growths().note(stream, &durable),
+            Effect::Publish(durable) => shared.notifications().note(stream, &durable),
             Effect::Fatal(reason) => shared.failure().report(reason),
             Effect::Stop => ctx.stop(),
         }

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::{data_dir, verify};
-use crate::actors::{Book, OrderError};
+use crate::actors::{OrderError, TenantRegistry};
 use crate::evidence::{Checkpoint, NoteSigner, VerifierKey};
 use crate::ids::TenantId;
 use crate::replay::{self, ORIGIN, Through, Wanted};
@@ -76,13 +76,13 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         let since = arguments.since.as_deref().map(|path| older(path, &signer.public()));
         let since = since.transpose()?;
         let failed = |error: OrderError| Failure::failed(error);
-        let mut book = Book::open(store.clone()).map_err(failed)?;
-        let note = book.sign(&tenant, Through::Head).map_err(failed)?;
+        let mut tenant_registry = TenantRegistry::open(store.clone()).map_err(failed)?;
+        let note = tenant_registry.sign(&tenant, Through::Head).map_err(failed)?;
         match since {
             None => note,
             Some(since) => {
                 let wanted = Wanted { record: None, reveal: false, since: Some(since.size) };
-                let registry = book.registry(&tenant);
+                let registry = tenant_registry.registry(&tenant);
                 let proof = replay::prove(&store, &tenant, &registry, &wanted);
                 proof.map_err(Failure::failed)?.to_text()
             }

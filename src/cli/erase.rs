@@ -1,9 +1,9 @@
 use clap::Args;
 use serde_json::json;
 
+use super::admin_client::Place;
 use super::embedded;
 use super::failure::Failure;
-use super::office::Place;
 use crate::events::PersonErased;
 use crate::ids::TenantId;
 

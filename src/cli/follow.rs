@@ -9,9 +9,9 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::credentials::Credentials;
 use super::embedded;
 use super::failure::Failure;
-use super::passport::Passport;
 use super::shown;
 use crate::frontends::{Followed, Follower, Position};
 use crate::ids::{Seq, StreamKey, WithinTenant};
@@ -35,7 +35,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ENDPOINT")]
     connect: String,
     #[command(flatten)]
-    passport: Passport,
+    credentials: Credentials,
     /// Print decrypted records. This needs an operator key.
     #[arg(long)]
     plain: bool,
@@ -54,11 +54,11 @@ pub struct Arguments {
 const LOOK: Duration = Duration::from_millis(200);
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
-    if !arguments.passport.is_given() {
+    if !arguments.credentials.is_given() {
         return Err(Failure::bad_input("a feed needs a key; name yours with --key"));
     }
     let positions = arguments.state.as_deref().map(read).transpose()?.unwrap_or_default();
-    let client = arguments.passport.client(&arguments.connect, embedded::user("follower")?)?;
+    let client = arguments.credentials.client(&arguments.connect, embedded::user("follower")?)?;
     let mut follower = match arguments.plain {
         true => Follower::plain(client, positions),
         false => Follower::sealed(client, positions),

@@ -1,11 +1,13 @@
 //! The command line: one file per command, and the conversation in a terminal.
 
+mod admin_client;
 mod args;
 mod audit;
 mod bar;
 mod check_copy;
 mod checkpoint;
 mod converse;
+mod credentials;
 mod data_dir;
 mod embedded;
 mod erase;
@@ -17,9 +19,7 @@ mod import;
 mod keys;
 mod log;
 mod logging;
-mod office;
 mod overlap;
-mod passport;
 mod past;
 mod proof;
 mod recipe;

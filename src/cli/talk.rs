@@ -2,8 +2,8 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::credentials::Credentials;
 use super::failure::Failure;
-use super::passport::Passport;
 use super::{embedded, terminal};
 
 /// How long to wait for a service to say hello.
@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ENDPOINT")]
     connect: String,
     #[command(flatten)]
-    passport: Passport,
+    credentials: Credentials,
     /// Your name. Each user has their own robot and their own lessons.
     #[arg(long, value_name = "NAME", default_value = "you")]
     user: String,
@@ -39,7 +39,8 @@ pub struct Arguments {
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let user = embedded::user(&arguments.user)?;
-    let client = arguments.passport.client(&arguments.connect, user)?.with_patience(HELLO_PATIENCE);
+    let client =
+        arguments.credentials.client(&arguments.connect, user)?.with_patience(HELLO_PATIENCE);
     client.hello().map_err(Failure::failed)?;
     let client = client.with_patience(PATIENCE);
     terminal::talk(&client, arguments.seed, arguments.task, None)

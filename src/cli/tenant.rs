@@ -2,9 +2,9 @@
 
 use clap::{Args, Subcommand};
 
+use super::admin_client::{AdminClient, Place};
 use super::failure::Failure;
 use super::log::utc;
-use super::office::{Office, Place};
 use super::overlap;
 use super::shown;
 use crate::actors::TenantView;
@@ -183,13 +183,13 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         }
     };
     let tenant = name(&tenant)?;
-    let mut office = place.enter(order == Order::Open)?;
+    let mut admin_client = place.enter(order == Order::Open)?;
     let retired = match &order {
         Order::Retire { key, .. } => Some(*key),
         _ => None,
     };
-    let said = match (office.obey(&tenant, order)?, retired) {
-        (0, Some(key)) => as_retired(&mut office, &tenant, &key),
+    let said = match (admin_client.obey(&tenant, order)?, retired) {
+        (0, Some(key)) => as_retired(&mut admin_client, &tenant, &key),
         (0, None) => "nothing changed; this was already done".to_owned(),
         _ => "done".to_owned(),
     };
@@ -198,9 +198,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
 }
 
 /// Why an order to retire a key led to no record.
-fn as_retired(office: &mut Office, tenant: &TenantId, key: &PublicKey) -> String {
+fn as_retired(admin_client: &mut AdminClient, tenant: &TenantId, key: &PublicKey) -> String {
     // None of it, when an operator has retired their own key and may not ask any more.
-    let tenants = office.list(Some(tenant)).unwrap_or_default();
+    let tenants = admin_client.list(Some(tenant)).unwrap_or_default();
     let known = tenants.iter().flat_map(|view| &view.keys).find(|known| known.key == *key);
     let retired_before = match known.map(|known| (known.retired, known.valid_until)) {
         Some((true, _)) => "the key is already retired and cannot be admitted again".to_owned(),
@@ -221,8 +221,8 @@ fn key(text: &str) -> Result<PublicKey, Failure> {
     read_public(text).map_err(Failure::bad_input)
 }
 
-fn list(office: &mut Office, only: Option<TenantId>) -> Result<(), Failure> {
-    let tenants = office.list(only.as_ref())?;
+fn list(admin_client: &mut AdminClient, only: Option<TenantId>) -> Result<(), Failure> {
+    let tenants = admin_client.list(only.as_ref())?;
     match (&only, tenants.is_empty()) {
         (Some(tenant), true) => return Err(absent(tenant)),
         (None, true) => {
@@ -262,8 +262,8 @@ fn show(view: &TenantView) {
     }
 }
 
-fn show_quotas(office: &mut Office, tenant: TenantId) -> Result<(), Failure> {
-    match office.list(Some(&tenant))?.first() {
+fn show_quotas(admin_client: &mut AdminClient, tenant: TenantId) -> Result<(), Failure> {
+    match admin_client.list(Some(&tenant))?.first() {
         Some(view) => println!("{tenant}: {}", view.quotas),
         None => return Err(absent(&tenant)),
     }

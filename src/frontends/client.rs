@@ -1,7 +1,7 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use super::knock::{Knock, knock};
+use super::probe::{Probe, probe};
 use super::wire::{self, Request};
 use super::{Context, CurveKey, Endpoint, EndpointError, z85};
 use crate::actors::{
@@ -95,7 +95,7 @@ const ATTEMPT: Duration = Duration::from_secs(2);
 /// The longest that one attempt waits.
 const ATTEMPT_MAX: Duration = Duration::from_secs(10);
 /// How long it is tried to find out why an answer is overdue.
-const KNOCK: Duration = Duration::from_secs(1);
+const PROBE: Duration = Duration::from_secs(1);
 
 impl Identity {
     pub fn put_on(&self, socket: &zmq::Socket) -> zmq::Result<()> {
@@ -424,28 +424,28 @@ impl Client {
             return Ok(());
         }
         let endpoint = self.endpoint.clone();
-        let error = match (knock(&endpoint, self.identity.as_ref(), KNOCK), &self.identity) {
-            (Knock::Silence, _) | (Knock::BrokenOff | Knock::NotAdmitted, None) => return Ok(()),
-            (Knock::LetIn, _) => {
+        let error = match (probe(&endpoint, self.identity.as_ref(), PROBE), &self.identity) {
+            (Probe::Silence, _) | (Probe::BrokenOff | Probe::NotAdmitted, None) => return Ok(()),
+            (Probe::LetIn, _) => {
                 // Let in now, and perhaps not when this client came.
                 return match self.state.get() {
                     Line::Heard => Ok(()),
                     Line::Fresh | Line::Closed => self.reconnect(),
                 };
             }
-            (Knock::NotAdmitted, Some(identity)) => {
+            (Probe::NotAdmitted, Some(identity)) => {
                 ClientError::NotAdmitted { endpoint, key: z85::show(identity.key.public()) }
             }
             // A service that asks for no key may break off as a wrong one does, but it lets in a client
             // that brings none.
-            (Knock::BrokenOff, Some(_)) if knock(&endpoint, None, KNOCK) == Knock::LetIn => {
+            (Probe::BrokenOff, Some(_)) if probe(&endpoint, None, PROBE) == Probe::LetIn => {
                 ClientError::NoKeyWanted { endpoint }
             }
-            (Knock::BrokenOff, Some(identity)) => {
+            (Probe::BrokenOff, Some(identity)) => {
                 ClientError::WrongServer { endpoint, server: z85::show(&identity.server) }
             }
-            (Knock::OtherDoor, None) => ClientError::KeyWanted { endpoint },
-            (Knock::OtherDoor, Some(_)) => ClientError::NoKeyWanted { endpoint },
+            (Probe::OtherDoor, None) => ClientError::KeyWanted { endpoint },
+            (Probe::OtherDoor, Some(_)) => ClientError::NoKeyWanted { endpoint },
         };
         self.state.set(Line::Closed);
         Err(error)

@@ -23,7 +23,10 @@ use super::raw::Outlet;
 use super::unsent::Unsent;
 use super::zap::{Gate, Seal};
 use super::{Context, CurveKey, Endpoint, GatewayError, lock, rights, wire};
-use crate::actors::{Failure, FeedView, Front, Growth, Growths, PlainView, Reader, SealedView};
+use crate::actors::{
+    CommitNotification, CommitNotifications, Failure, FeedView, Front, PlainView, Reader,
+    SealedView,
+};
 use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId};
 use crate::limits::{CUT_OFF_S, FEED_UNSENT_BYTES_MAX, FOREIGN_TOPICS_MAX, TOPICS_MAX};
 use crate::tenancy::Admissions;
@@ -72,7 +75,7 @@ pub struct FeedDoor<'a> {
     pub endpoint: &'a Endpoint,
     /// Messages that wait for one subscriber; see [`crate::limits::FEED_WAITING_MAX`].
     pub waiting_max: i32,
-    pub growths: Growths,
+    pub notifications: CommitNotifications,
     pub reader: Reader,
 }
 
@@ -139,7 +142,7 @@ impl Views {
 }
 
 impl Feed {
-    /// The doorkeeper must be there already, and must outlive it.
+    /// The authenticator must be there already, and must outlive it.
     pub fn open(
         context: &Context,
         door: FeedDoor<'_>,
@@ -148,7 +151,7 @@ impl Feed {
         failure: Failure,
     ) -> Result<Feed, GatewayError> {
         let start = |error: std::io::Error| GatewayError::Start { reason: error.to_string() };
-        let FeedDoor { endpoint, waiting_max, growths, reader } = door;
+        let FeedDoor { endpoint, waiting_max, notifications, reader } = door;
         let (bell, inbox) = Outbox::new().map_err(start)?;
         let (views, stopping) = (Views::new(), Arc::new(AtomicBool::new(false)));
         let mut press = Press {
@@ -159,7 +162,7 @@ impl Feed {
             key: key.clone(),
             watch,
             unsent: Unsent::new(FEED_UNSENT_BYTES_MAX),
-            growths: growths.clone(),
+            notifications: notifications.clone(),
             reader,
             failure: failure.clone(),
             views: views.clone(),
@@ -167,7 +170,7 @@ impl Feed {
         };
         press.open_all()?;
         let (wake, stopped) = (bell.clone(), stopping.clone());
-        growths.listen(move || wake.wake());
+        notifications.listen(move || wake.wake());
         let thread = thread::Builder::new()
             .name("feed".to_owned())
             .spawn(move || {
@@ -210,7 +213,7 @@ struct Press {
     watch: Watch,
     /// Messages that have not left the process.
     unsent: Unsent,
-    growths: Growths,
+    notifications: CommitNotifications,
     reader: Reader,
     failure: Failure,
     views: Views,
@@ -293,7 +296,7 @@ impl Subscribed {
                     return Ok(Some(key));
                 }
                 (Some((0, topic)), _) => self.topics.remove(topic),
-                // No subscription, or a connection that the doorkeeper did not vouch for.
+                // No subscription, or a connection that the authenticator did not vouch for.
                 _ => {}
             }
         }
@@ -320,8 +323,8 @@ impl Press {
             self.hear();
             let stops = stopping.load(Ordering::SeqCst);
             let mut published = 0u32;
-            while let Some(growth) = self.growths.next() {
-                self.publish(&growth);
+            while let Some(notification) = self.notifications.next() {
+                self.publish(&notification);
                 published += 1;
                 // Sending takes in subscriptions, too: they are counted in between.
                 if published.is_multiple_of(HEAR_EVERY) {
@@ -436,18 +439,18 @@ impl Press {
         }
     }
 
-    fn publish(&mut self, growth: &Growth) {
-        let tenant = &growth.stream.tenant;
+    fn publish(&mut self, notification: &CommitNotification) {
+        let tenant = &notification.stream.tenant;
         self.tend(tenant);
         if self.failure.reason().is_some() {
             return;
         }
         let Some(stand) = self.stands.get(tenant) else { return };
-        let count = (growth.last.get() - growth.first.get() + 1) as u32;
-        let number = |seq: Seq| growth.number + (seq.get() - growth.first.get());
+        let count = (notification.last.get() - notification.first.get() + 1) as u32;
+        let number = |seq: Seq| notification.number + (seq.get() - notification.first.get());
         let start = self.views.start;
         if let Some(Subscribed { socket, .. }) = &stand.sockets[0] {
-            match self.reader.sealed(&growth.stream, growth.first, count) {
+            match self.reader.sealed(&notification.stream, notification.first, count) {
                 Ok(read) => {
                     for record in read.records {
                         let topic = record.stream.to_hex();
@@ -463,7 +466,7 @@ impl Press {
             }
         }
         if let Some(Subscribed { socket, .. }) = &stand.sockets[1] {
-            match self.reader.plain(&growth.stream, growth.first, count) {
+            match self.reader.plain(&notification.stream, notification.first, count) {
                 Ok(read) => {
                     for record in read.records {
                         let topic = record.stream.to_hex();
@@ -494,7 +497,7 @@ impl Press {
         for tenant in self.watch.admissions.tenants() {
             self.tend(&tenant);
         }
-        let Some(numbers) = self.growths.all_taken() else { return };
+        let Some(numbers) = self.notifications.all_taken() else { return };
         let (v, start) = (wire::VERSION, self.views.start);
         for (tenant, stand) in &self.stands {
             let number = numbers.get(tenant).copied().unwrap_or(0);
@@ -563,7 +566,7 @@ impl Stand {
 
 /// Bytes of a frame from a subscriber: a topic has 32, what is said at the handshake some 300.
 const SUBSCRIPTION_BYTES_MAX: i64 = 1_024;
-/// Growths published before subscriptions are read.
+/// CommitNotifications published before subscriptions are read.
 const HEAR_EVERY: u32 = 64;
 /// Subscriptions read before messages are sent again.
 const BURST: usize = 1_024;

@@ -13,7 +13,7 @@ use super::passes::Passes;
 use super::rights::{self, Caller};
 use super::unsent::{Parcel, Place, Unsent};
 use super::wire::{self, Refused};
-use super::zap::{Doorkeeper, Seal};
+use super::zap::{Authenticator, Seal};
 use super::{Context, CurveKey, Endpoint, lock};
 use crate::actors::{
     AnswerTo, Ask, DoorAsk, ErasedView, ErrorCode, Failed, Failure, Front, NotTaken, Ordered,
@@ -35,7 +35,7 @@ pub struct Gateway {
     thread: Option<JoinHandle<()>>,
     feed: Option<Feed>,
     // After the gateway's thread has closed its sockets: without it handshakes fail open.
-    _doorkeeper: Option<Doorkeeper>,
+    _doorkeeper: Option<Authenticator>,
 }
 
 /// Where a gateway listens.
@@ -82,7 +82,7 @@ struct Outgoing {
 /// Whom a message came from. Only a way back: never a proof of who they are.
 #[derive(Debug, Clone)]
 struct Peer {
-    /// The place of its door in [`Hall::doors`].
+    /// The place of its door in [`EventLoop::doors`].
     door: usize,
     routing_id: Vec<u8>,
     /// REQ sockets put an empty frame between envelope and message and want it back.
@@ -117,12 +117,12 @@ impl Gateway {
         let open = door.bind(doors.open)?;
         let mut locked = Vec::new();
         let mut routers = vec![door];
-        let (mut doorkeeper, mut feed) = (None, None);
+        let (mut authenticator, mut feed) = (None, None);
         if let Some(LockedDoor { endpoints, key, feed: wanted }) = doors.locked {
             lock::check(zmq::has("curve"))?;
             let (seal, wake) = (Seal::fresh(), outbox.clone());
             let (admissions, passes) = (registrar.admissions().clone(), Passes::new());
-            let keeper = Doorkeeper::start(
+            let keeper = Authenticator::start(
                 context,
                 seal.clone(),
                 admissions.clone(),
@@ -131,7 +131,7 @@ impl Gateway {
                 failure.clone(),
                 move || wake.wake(),
             );
-            doorkeeper = Some(keeper.map_err(start)?);
+            authenticator = Some(keeper.map_err(start)?);
             let watch = Watch {
                 admissions: admissions.clone(),
                 seal: seal.clone(),
@@ -152,7 +152,7 @@ impl Gateway {
             counters: counters.clone(),
             front: front.clone(),
         };
-        let hall = Hall {
+        let hall = EventLoop {
             doors: routers,
             front,
             registrar,
@@ -185,7 +185,7 @@ impl Gateway {
             outbox,
             thread: Some(thread),
             feed,
-            _doorkeeper: doorkeeper,
+            _doorkeeper: authenticator,
         })
     }
 
@@ -230,7 +230,7 @@ impl Drop for Gateway {
 }
 
 /// What the gateway's thread owns.
-struct Hall {
+struct EventLoop {
     doors: Vec<Door>,
     front: Front,
     registrar: Registrar,
@@ -274,7 +274,7 @@ impl Packer {
     }
 }
 
-impl Hall {
+impl EventLoop {
     fn serve(self, mut inbox: Inbox<Outgoing>) {
         let mut stop_by = None;
         loop {

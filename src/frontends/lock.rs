@@ -20,9 +20,9 @@ pub(super) fn check(has: Option<bool>) -> Result<(), GatewayError> {
 }
 
 /// Makes whoever connects to `socket` prove which key they have. Before it is bound; and only the
-/// [`super::zap::Doorkeeper`] holds those keys against the register.
+/// [`super::zap::Authenticator`] holds those keys against the register.
 ///
-/// - `domain`: what the doorkeeper is told of where they knock.
+/// - `domain`: what the authenticator is told of where they knock.
 pub(super) fn put_on(socket: &zmq::Socket, key: &CurveKey, domain: &str) -> zmq::Result<()> {
     socket.set_curve_server(true)?;
     socket.set_curve_publickey(&key.public().0)?;

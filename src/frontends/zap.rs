@@ -101,14 +101,14 @@ impl Seal {
 /// The thread that answers handshakes. Ends when dropped, which must come after the sockets that
 /// need it are closed.
 #[derive(Debug)]
-pub(super) struct Doorkeeper {
+pub(super) struct Authenticator {
     bell: Outbox<()>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// What the thread owns. The guard comes first, so that the end is reported before the socket is
 /// closed: from then on handshakes fail open.
-struct Desk<W: Fn()> {
+struct Handshakes<W: Fn()> {
     guard: Guard<W>,
     socket: zmq::Socket,
     inbox: Inbox<()>,
@@ -135,7 +135,7 @@ impl<W: Fn()> Drop for Guard<W> {
     }
 }
 
-impl Doorkeeper {
+impl Authenticator {
     /// Must be there before the first socket that needs it listens.
     ///
     /// - `wake`: called when the thread ended without having been told to, after that was reported.
@@ -148,7 +148,7 @@ impl Doorkeeper {
         counters: Arc<Counters>,
         failure: Failure,
         wake: impl Fn() + Send + 'static,
-    ) -> Result<Doorkeeper, String> {
+    ) -> Result<Authenticator, String> {
         let socket = context.socket(zmq::REP).map_err(|error| error.to_string())?;
         socket
             .set_linger(0)
@@ -156,9 +156,9 @@ impl Doorkeeper {
             .map_err(|error| format!("new connections cannot be authenticated: {error}"))?;
         let (bell, inbox) = Outbox::new().map_err(|error| error.to_string())?;
         let guard = Guard { failure: failure.clone(), wake, told: false };
-        let mut desk = Desk { guard, socket, inbox, seal, admissions, passes, counters };
+        let mut desk = Handshakes { guard, socket, inbox, seal, admissions, passes, counters };
         let thread = thread::Builder::new()
-            .name("doorkeeper".to_owned())
+            .name("authenticator".to_owned())
             .spawn(move || {
                 if let Err(error) = desk.serve() {
                     failure
@@ -166,11 +166,11 @@ impl Doorkeeper {
                 }
             })
             .map_err(|error| error.to_string())?;
-        Ok(Doorkeeper { bell, thread: Some(thread) })
+        Ok(Authenticator { bell, thread: Some(thread) })
     }
 }
 
-impl Drop for Doorkeeper {
+impl Drop for Authenticator {
     fn drop(&mut self) {
         self.bell.put(());
         if let Some(thread) = self.thread.take() {
@@ -180,7 +180,7 @@ impl Drop for Doorkeeper {
     }
 }
 
-impl<W: Fn()> Desk<W> {
+impl<W: Fn()> Handshakes<W> {
     fn serve(&mut self) -> zmq::Result<()> {
         loop {
             let mut items = [
@@ -197,7 +197,7 @@ impl<W: Fn()> Desk<W> {
                 return Ok(());
             }
             if asked {
-                sabotage::point("doorkeeper");
+                sabotage::point("authenticator");
                 let question = match self.question() {
                     Ok(question) => question,
                     Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => continue,
@@ -277,11 +277,11 @@ mod tests {
     use crate::actors::wall_clock;
     use crate::tenancy::Role;
 
-    /// A doorkeeper, and a socket that asks it what ZeroMQ asks.
-    fn desk() -> (Doorkeeper, zmq::Socket, Failure) {
+    /// A authenticator, and a socket that asks it what ZeroMQ asks.
+    fn desk() -> (Authenticator, zmq::Socket, Failure) {
         let (context, failure) = (Context::new(), Failure::default());
         let (admissions, counters) = (Admissions::new(wall_clock()), Arc::default());
-        let keeper = Doorkeeper::start(
+        let keeper = Authenticator::start(
             &context,
             Seal::fresh(),
             admissions,

@@ -8,8 +8,8 @@ use std::thread;
 use std::time::Duration;
 
 use crate::actors::{
-    ActorsError, Erased, Failure, House, HouseSettings, OrderError, Registrar, Usage, Wakings,
-    wall_clock,
+    ActorSettings, ActorSystem, ActorsError, Erased, Failure, OrderError, Registrar, Usage,
+    Wakings, wall_clock,
 };
 use crate::frontends::{
     Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
@@ -87,7 +87,7 @@ pub enum StartError {
 pub struct Service {
     // Dropped, and stopped, in this order: first nobody comes in, then everybody goes to sleep.
     gateway: Gateway,
-    house: House,
+    actors: ActorSystem,
     context: Context,
     failure: Failure,
     server_key: Option<PublicKey>,
@@ -156,7 +156,7 @@ impl Service {
             }
             (false, None, Data::Memory) => Some(CurveKey::new()?),
         };
-        let house = House::start(HouseSettings {
+        let actors = ActorSystem::start(ActorSettings {
             domain: config.domain,
             store,
             recipe_text: config.recipe_text,
@@ -168,16 +168,16 @@ impl Service {
         })?;
         let context = Context::new();
         let waiting_max = config.feed_waiting_max;
-        let feed = feed.as_ref().zip(house.reader()).map(|(endpoint, reader)| {
-            let growths = house.growths().clone();
-            FeedDoor { endpoint, waiting_max, growths, reader }
+        let feed = feed.as_ref().zip(actors.reader()).map(|(endpoint, reader)| {
+            let notifications = actors.notifications().clone();
+            FeedDoor { endpoint, waiting_max, notifications, reader }
         });
         let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key, feed });
         let doors = Doors { inner: INNER, open: &open, locked };
-        let (front, registrar) = (house.front(), house.registrar().clone());
+        let (front, registrar) = (actors.front(), actors.registrar().clone());
         let gateway = Gateway::open(&context, doors, front, registrar, failure.clone())?;
         let server_key = key.map(|key| *key.public());
-        Ok(Service { gateway, house, context, failure, server_key })
+        Ok(Service { gateway, actors, context, failure, server_key })
     }
 
     /// A client inside this process.
@@ -207,7 +207,7 @@ impl Service {
 
     /// Where orders about tenants are handed in from inside the process.
     pub fn registrar(&self) -> &Registrar {
-        self.house.registrar()
+        self.actors.registrar()
     }
 
     /// The service's own public key, when it has a door with keys.
@@ -221,7 +221,7 @@ impl Service {
     /// - errors: nobody of that name, or what stood in the way.
     pub fn erase(&self, tenant: TenantId, user: UserId) -> Erased {
         let (sender, receiver) = mpsc::channel();
-        self.house.erase(tenant, user, move |erased| {
+        self.actors.erase(tenant, user, move |erased| {
             // Nobody waits any more when the service was dropped meanwhile.
             let _ = sender.send(erased);
         });
@@ -235,17 +235,17 @@ impl Service {
 
     /// What each tenant takes, and how often it was turned away.
     pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
-        self.house.usage()
+        self.actors.usage()
     }
 
     /// People awake now.
     pub fn awake(&self) -> usize {
-        self.house.awake()
+        self.actors.awake()
     }
 
     /// What waking people has cost, and how often a kept mind or snapshot was stale or damaged.
     pub fn wakings(&self) -> Wakings {
-        self.house.wakings()
+        self.actors.wakings()
     }
 
     /// Why the service cannot go on, if so: it then answers nobody, and whoever started it must
@@ -282,7 +282,7 @@ impl Service {
     fn close(&mut self) {
         self.failure.stop_expected();
         self.gateway.close();
-        self.house.stop();
+        self.actors.stop();
     }
 }
 

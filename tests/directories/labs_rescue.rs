@@ -11,7 +11,7 @@ use crate::support::chance::{below, number, seed};
 use crate::support::diary::Diary;
 use crate::support::toy::{self, Bells};
 use crate::support::tree::copy_tree;
-use apprentice::actors::Book;
+use apprentice::actors::TenantRegistry;
 use apprentice::events::{Head, Quotas, Role};
 use apprentice::ids::{PublicKey, Seq, StreamId, StreamKey, TenantId};
 use apprentice::learning::Recipe;
@@ -140,25 +140,25 @@ fn live(store: &Store, tenant: &TenantId, user: &str) -> StreamId {
     diary.stream
 }
 
-/// The directory's labs with an open book.
-fn begun(dir: &Path, names: &[&str]) -> (Store, Book) {
+/// The directory's labs with an open tenant_registry.
+fn begun(dir: &Path, names: &[&str]) -> (Store, TenantRegistry) {
     let store = open(dir).unwrap();
-    let mut book = Book::open(store.clone()).unwrap();
+    let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
     for name in names {
-        book.obey(&lab(name), &Order::Open).unwrap();
+        tenant_registry.obey(&lab(name), &Order::Open).unwrap();
     }
-    (store, book)
+    (store, tenant_registry)
 }
 
 #[test]
 fn the_two_labs_of_the_walk_through_keep_their_keys_and_quotas() {
     let dir = room();
-    let (store, mut book) = begun(dir.path(), &["mug-lab", "fridge-lab"]);
+    let (store, mut tenant_registry) = begun(dir.path(), &["mug-lab", "fridge-lab"]);
     for (number, name) in ["mug-lab", "fridge-lab"].into_iter().enumerate() {
-        book.obey(&lab(name), &admit(number as u64, Role::Gateway)).unwrap();
-        book.obey(&lab(name), &quotas(50)).unwrap();
+        tenant_registry.obey(&lab(name), &admit(number as u64, Role::Gateway)).unwrap();
+        tenant_registry.obey(&lab(name), &quotas(50)).unwrap();
     }
-    drop((store, book));
+    drop((store, tenant_registry));
     let all = check_whole(dir.path());
     assert_eq!(all.values().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
 }
@@ -166,28 +166,28 @@ fn the_two_labs_of_the_walk_through_keep_their_keys_and_quotas() {
 #[test]
 fn two_labs_with_people_erased_retired_and_disabled_are_kept_whole() {
     let dir = room();
-    let (store, mut book) = begun(dir.path(), &["mug-lab", "fridge-lab"]);
+    let (store, mut tenant_registry) = begun(dir.path(), &["mug-lab", "fridge-lab"]);
     let fridge = lab("fridge-lab");
     for (number, name) in ["mug-lab", "fridge-lab"].into_iter().enumerate() {
-        book.obey(&lab(name), &admit(number as u64, Role::Gateway)).unwrap();
-        book.obey(&lab(name), &quotas(50)).unwrap();
+        tenant_registry.obey(&lab(name), &admit(number as u64, Role::Gateway)).unwrap();
+        tenant_registry.obey(&lab(name), &quotas(50)).unwrap();
         for user in ["ada", "bob"] {
             live(&store, &lab(name), user);
         }
-        book.sign(&lab(name), Through::Episodes).unwrap();
+        tenant_registry.sign(&lab(name), Through::Episodes).unwrap();
     }
-    book.obey(&fridge, &admit(9, Role::Operator)).unwrap();
-    book.obey(&fridge, &Order::Retire { key: key(9), overlap_seconds: 0 }).unwrap();
+    tenant_registry.obey(&fridge, &admit(9, Role::Operator)).unwrap();
+    tenant_registry.obey(&fridge, &Order::Retire { key: key(9), overlap_seconds: 0 }).unwrap();
     let bob = stream(&store.keys, "fridge-lab", "bob");
-    book.erase(&bob).unwrap();
-    book.obey(&fridge, &Order::Disable { reason: "over".to_owned() }).unwrap();
-    book.sign(&fridge, Through::Head).unwrap();
-    drop((store, book));
+    tenant_registry.erase(&bob).unwrap();
+    tenant_registry.obey(&fridge, &Order::Disable { reason: "over".to_owned() }).unwrap();
+    tenant_registry.sign(&fridge, Through::Head).unwrap();
+    drop((store, tenant_registry));
     check_whole(dir.path());
     let out = dir.path().join("out");
     store::salvage(dir.path(), &out).unwrap();
-    let book = Book::open(open(&out).unwrap()).unwrap();
-    let registry = book.registry(&fridge);
+    let tenant_registry = TenantRegistry::open(open(&out).unwrap()).unwrap();
+    let registry = tenant_registry.registry(&fridge);
     assert!(registry.erased().contains_key(&bob.key));
     assert_eq!(registry.standing().disabled(), Some("over"));
     assert!(registry.standing().keys()[&key(9)].retired.is_some());
@@ -197,12 +197,12 @@ fn two_labs_with_people_erased_retired_and_disabled_are_kept_whole() {
 #[test]
 fn a_thousand_own_records_beside_two_are_kept_and_the_two_as_well() {
     let dir = room();
-    let (store, mut book) = begun(dir.path(), &["large", "local"]);
-    book.obey(&lab("local"), &admit(0, Role::Gateway)).unwrap();
+    let (store, mut tenant_registry) = begun(dir.path(), &["large", "local"]);
+    tenant_registry.obey(&lab("local"), &admit(0, Role::Gateway)).unwrap();
     for awake in 1..1_000 {
-        book.obey(&lab("large"), &quotas(awake)).unwrap();
+        tenant_registry.obey(&lab("large"), &quotas(awake)).unwrap();
     }
-    drop((store, book));
+    drop((store, tenant_registry));
     let all = check_whole(dir.path());
     assert_eq!(all.values().map(Vec::len).collect::<Vec<_>>(), [1_000, 2]);
 }
@@ -210,8 +210,8 @@ fn a_thousand_own_records_beside_two_are_kept_and_the_two_as_well() {
 /// Three labs, two of which share a secret, so that one name gives one stream key in both. Records of
 /// many chunks, of the same lengths and under the same keys.
 fn twins(dir: &Path) {
-    let (store, book) = begun(dir, &["one", "other"]);
-    drop((store, book));
+    let (store, tenant_registry) = begun(dir, &["one", "other"]);
+    drop((store, tenant_registry));
     fs::copy(dir.join("keys/one.key"), dir.join("keys/two.key")).unwrap();
     let store = open(dir).unwrap();
     for round in 0..4 {
@@ -285,10 +285,10 @@ fn program(arguments: &[&str]) -> Output {
 #[test]
 fn the_command_says_of_every_lab_what_was_kept_and_lost() {
     let dir = room();
-    let (store, mut book) = begun(dir.path(), &["mug-lab", "fridge-lab"]);
-    book.obey(&lab("mug-lab"), &quotas(50)).unwrap();
+    let (store, mut tenant_registry) = begun(dir.path(), &["mug-lab", "fridge-lab"]);
+    tenant_registry.obey(&lab("mug-lab"), &quotas(50)).unwrap();
     live(&store, &lab("fridge-lab"), "ada");
-    drop((store, book));
+    drop((store, tenant_registry));
     let (data, out) = (dir.path().to_str().unwrap(), dir.path().join("out"));
     let salvage = || program(&["salvage", "--data", data, "--out", out.to_str().unwrap()]);
     let run = salvage();
@@ -319,13 +319,13 @@ fn the_command_says_of_every_lab_what_was_kept_and_lost() {
 fn any_directory(dir: &Path, dice: &SeededEntropy) {
     let count = 1 + below(dice, 5);
     let names = &["local", "mug-lab", "fridge-lab", "a", "z-9"][..count];
-    let (mut store, mut book) = begun(dir, names);
+    let (mut store, mut tenant_registry) = begun(dir, names);
     let mut people: Vec<StreamId> = Vec::new();
     let mut numbers = 0;
     for name in names {
         let many = [0, 1, 5, 60][below(dice, 4)];
         for awake in 0..many {
-            book.obey(&lab(name), &quotas(awake + 1)).unwrap();
+            tenant_registry.obey(&lab(name), &quotas(awake + 1)).unwrap();
         }
         for person in 0..below(dice, 6) {
             people.push(live(&store, &lab(name), &format!("person {person}")));
@@ -334,30 +334,34 @@ fn any_directory(dir: &Path, dice: &SeededEntropy) {
     for _ in 0..below(dice, 30) {
         let tenant = lab(names[below(dice, names.len())]);
         match below(dice, 9) {
-            0 => drop(book.sign(&tenant, Through::Episodes).unwrap()),
-            1 => drop(book.sign(&tenant, Through::Head).unwrap()),
+            0 => drop(tenant_registry.sign(&tenant, Through::Episodes).unwrap()),
+            1 => drop(tenant_registry.sign(&tenant, Through::Head).unwrap()),
             2 if !people.is_empty() => {
                 let erased = people.swap_remove(below(dice, people.len()));
-                book.erase(&erased).unwrap();
+                tenant_registry.erase(&erased).unwrap();
             }
-            3 => drop(book.obey(&tenant, &Order::Disable { reason: "over".into() }).unwrap()),
-            4 => drop(book.obey(&tenant, &Order::Enable).unwrap()),
+            3 => drop(
+                tenant_registry.obey(&tenant, &Order::Disable { reason: "over".into() }).unwrap(),
+            ),
+            4 => drop(tenant_registry.obey(&tenant, &Order::Enable).unwrap()),
             5 => {
-                let known = book.registry(&tenant);
+                let known = tenant_registry.registry(&tenant);
                 let keys: Vec<_> = known.standing().keys().keys().copied().collect();
                 if !keys.is_empty() {
                     let key = keys[below(dice, keys.len())];
-                    book.obey(&tenant, &Order::Retire { key, overlap_seconds: 0 }).unwrap();
+                    tenant_registry
+                        .obey(&tenant, &Order::Retire { key, overlap_seconds: 0 })
+                        .unwrap();
                 }
             }
             6 => {
-                drop((store, book));
-                (store, book) = begun(dir, &[]);
+                drop((store, tenant_registry));
+                (store, tenant_registry) = begun(dir, &[]);
             }
             _ => {
                 numbers += 1;
                 let role = Role::ALL[below(dice, 3)];
-                book.obey(&tenant, &admit(numbers, role)).unwrap();
+                tenant_registry.obey(&tenant, &admit(numbers, role)).unwrap();
             }
         }
     }
@@ -379,17 +383,17 @@ fn of_a_damaged_directory_every_lab_keeps_a_prefix_of_its_own_and_is_told_what_i
     let dice = SeededEntropy::new(seed());
     let (dir, hurt) = (room(), room());
     let names = ["one", "two", "three"];
-    let (store, mut book) = begun(dir.path(), &names);
+    let (store, mut tenant_registry) = begun(dir.path(), &names);
     for round in 0..20 {
         for name in names {
-            book.obey(&lab(name), &quotas(round + 1)).unwrap();
+            tenant_registry.obey(&lab(name), &quotas(round + 1)).unwrap();
             let ada = stream(&store.keys, name, "ada");
             let long = "x".repeat(below(&dice, 9_000));
             let head = store.log.head(&ada).unwrap();
             store.log.append(&ada, head, batch([long.as_str()])).wait().unwrap();
         }
     }
-    drop((store, book));
+    drop((store, tenant_registry));
     let all = everything(dir.path());
     let database = fs::read(dir.path().join("log/db")).unwrap();
     let used: Vec<usize> = (0..database.len()).filter(|&at| database[at] != 0).collect();

@@ -21,7 +21,7 @@ const DAY: u64 = 24 * 60 * 60;
 const YEARS: u64 = 10 * 365 * DAY;
 
 /// A lab with a directory, and a clock that is set by hand.
-struct House {
+struct ActorSystem {
     folder: tempfile::TempDir,
     wall: Arc<AtomicU64>,
     key: CurveKey,
@@ -36,20 +36,20 @@ fn user(name: &str) -> UserId {
     UserId::new(name).unwrap()
 }
 
-impl House {
+impl ActorSystem {
     /// With one gateway key, admitted at `seconds`.
-    fn new(seconds: u64) -> House {
+    fn new(seconds: u64) -> ActorSystem {
         let (folder, key) = (tempfile::tempdir().unwrap(), CurveKey::new().unwrap());
         let wall = Arc::new(AtomicU64::new(seconds));
-        let mut house = House { folder, wall, key, service: None };
-        house.start(seconds);
+        let mut actors = ActorSystem { folder, wall, key, service: None };
+        actors.start(seconds);
         let admit = Order::Admit {
-            key: *house.key.public(),
+            key: *actors.key.public(),
             role: Role::Gateway,
             label: "robot".to_owned(),
         };
-        assert_eq!((house.order(Order::Open), house.order(admit)), (1, 1));
-        house
+        assert_eq!((actors.order(Order::Open), actors.order(admit)), (1, 1));
+        actors
     }
 
     fn at(&self, seconds: u64) {
@@ -124,91 +124,91 @@ impl House {
 
 #[test]
 fn a_retired_key_stays_out_when_the_clock_is_set_back_before_and_after_a_restart() {
-    let mut house = House::new(TODAY);
-    let open = house.connect();
+    let mut actors = ActorSystem::new(TODAY);
+    let open = actors.connect();
     open.hello().unwrap();
-    house.at(TODAY + 5);
-    assert_eq!(house.retire(0), 1);
-    house.shut(&open);
-    house.at(TODAY - DAY);
-    house.shut(&open);
-    assert_eq!(house.retire(0), 0);
+    actors.at(TODAY + 5);
+    assert_eq!(actors.retire(0), 1);
+    actors.shut(&open);
+    actors.at(TODAY - DAY);
+    actors.shut(&open);
+    assert_eq!(actors.retire(0), 0);
     for seconds in [TODAY - DAY, TODAY + 3, 0, TODAY + YEARS] {
-        house.start(seconds);
-        house.shut_to_new();
+        actors.start(seconds);
+        actors.shut_to_new();
     }
 }
 
 #[test]
 fn an_overlap_that_was_seen_to_end_stays_ended_and_a_later_record_tells_the_next_process() {
-    let mut house = House::new(TODAY);
-    let open = house.connect();
-    assert_eq!(house.retire(60), 1);
-    house.at(TODAY + 59);
+    let mut actors = ActorSystem::new(TODAY);
+    let open = actors.connect();
+    assert_eq!(actors.retire(60), 1);
+    actors.at(TODAY + 59);
     open.hello().unwrap();
-    house.connect().hello().unwrap();
-    assert!(!house.view().retired);
-    house.at(TODAY + 60);
-    house.shut(&open);
-    house.at(TODAY + 30);
-    house.shut(&open);
+    actors.connect().hello().unwrap();
+    assert!(!actors.view().retired);
+    actors.at(TODAY + 60);
+    actors.shut(&open);
+    actors.at(TODAY + 30);
+    actors.shut(&open);
     // Something that has nothing to do with the key is recorded after its end.
-    house.at(TODAY + 61);
-    house.order(Order::Disable { reason: "a pause".to_owned() });
-    house.order(Order::Enable);
-    house.start(TODAY + 30);
-    house.shut_to_new();
+    actors.at(TODAY + 61);
+    actors.order(Order::Disable { reason: "a pause".to_owned() });
+    actors.order(Order::Enable);
+    actors.start(TODAY + 30);
+    actors.shut_to_new();
 }
 
 #[test]
 fn a_clock_set_back_before_an_overlap_began_ends_it() {
-    let mut house = House::new(TODAY);
-    let open = house.connect();
+    let mut actors = ActorSystem::new(TODAY);
+    let open = actors.connect();
     open.hello().unwrap();
-    house.retire(60);
-    house.at(TODAY - 1);
-    house.shut(&open);
+    actors.retire(60);
+    actors.at(TODAY - 1);
+    actors.shut(&open);
     // What is recorded now has a held time; a record says what the clock read.
-    assert_eq!(house.order(Order::Disable { reason: "a pause".to_owned() }), 2);
-    house.order(Order::Enable);
-    house.start(TODAY + 30);
-    house.shut_to_new();
+    assert_eq!(actors.order(Order::Disable { reason: "a pause".to_owned() }), 2);
+    actors.order(Order::Enable);
+    actors.start(TODAY + 30);
+    actors.shut_to_new();
 }
 
 #[test]
 fn a_clock_that_ran_ahead_once_keeps_no_key_and_its_overlaps_are_real_seconds() {
-    let house = House::new(TODAY + YEARS);
-    house.at(TODAY);
-    let open = house.connect();
+    let actors = ActorSystem::new(TODAY + YEARS);
+    actors.at(TODAY);
+    let open = actors.connect();
     open.hello().unwrap();
-    assert_eq!(house.retire(0), 1);
-    house.shut(&open);
+    assert_eq!(actors.retire(0), 1);
+    actors.shut(&open);
 
-    let mut house = House::new(TODAY + YEARS);
-    house.at(TODAY);
-    let open = house.connect();
-    assert_eq!(house.retire(60), 1);
-    house.at(TODAY + 59);
+    let mut actors = ActorSystem::new(TODAY + YEARS);
+    actors.at(TODAY);
+    let open = actors.connect();
+    assert_eq!(actors.retire(60), 1);
+    actors.at(TODAY + 59);
     open.hello().unwrap();
-    house.at(TODAY + 60);
-    house.shut(&open);
-    house.start(TODAY + 60);
-    house.shut_to_new();
+    actors.at(TODAY + 60);
+    actors.shut(&open);
+    actors.start(TODAY + 60);
+    actors.shut_to_new();
 }
 
 #[test]
 fn a_shorter_overlap_takes_effect_and_one_beyond_the_bound_is_refused() {
-    let house = House::new(TODAY);
-    let open = house.connect();
-    let forever = Order::Retire { key: *house.key.public(), overlap_seconds: u64::MAX };
-    let refused = house.operator().order(Some(lab()), forever).unwrap_err().to_string();
+    let actors = ActorSystem::new(TODAY);
+    let open = actors.connect();
+    let forever = Order::Retire { key: *actors.key.public(), overlap_seconds: u64::MAX };
+    let refused = actors.operator().order(Some(lab()), forever).unwrap_err().to_string();
     assert!(refused.contains("at most 2592000 seconds (30 days)"), "{refused}");
-    assert_eq!(house.retire(1_000), 1);
-    assert_eq!(house.retire(2_000), 0);
+    assert_eq!(actors.retire(1_000), 1);
+    assert_eq!(actors.retire(2_000), 0);
     open.hello().unwrap();
-    assert_eq!(house.retire(10), 1);
-    house.at(TODAY + 10);
-    house.shut(&open);
+    assert_eq!(actors.retire(10), 1);
+    actors.at(TODAY + 10);
+    actors.shut(&open);
 }
 
 /// Runs a command that goes well.
@@ -226,25 +226,25 @@ fn said(arguments: &[&str], data: &Path) -> String {
 #[test]
 fn the_log_shows_which_times_were_held() {
     const HELD: &str = "time held: the clock did not move forward";
-    let mut house = House::new(TODAY);
-    let ada = house.service().connect(user("ada")).unwrap();
+    let mut actors = ActorSystem::new(TODAY);
+    let ada = actors.service().connect(user("ada")).unwrap();
     ada.start(Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }).unwrap();
-    house.at(TODAY + 7);
+    actors.at(TODAY + 7);
     ada.say("ring the brass bell").unwrap();
-    house.at(TODAY - DAY);
+    actors.at(TODAY - DAY);
     ada.say("ring the brass bell").unwrap();
-    house.at(TODAY + 9);
+    actors.at(TODAY + 9);
     ada.say("ring the brass bell").unwrap();
-    house.stop();
+    actors.stop();
 
-    let shown = said(&["log", "show", "--user", "ada"], &house.directory());
+    let shown = said(&["log", "show", "--user", "ada"], &actors.directory());
     let lines: Vec<&str> = shown.lines().collect();
     let said = (0..lines.len()).filter(|&at| lines[at].contains(" Interpreted "));
     let held: Vec<bool> = said.map(|at| lines[at + 1].trim() == HELD).collect();
     assert_eq!(held, [false, true, false], "{shown}");
 
     // Times never run backwards, in a tenant's own stream neither.
-    let store = store::open(&house.directory()).unwrap();
+    let store = store::open(&actors.directory()).unwrap();
     for stream in [
         store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap(),
         StreamId::of_tenant(&lab()),

@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use apprentice::actors::{Book, OrderError};
+use apprentice::actors::{OrderError, TenantRegistry};
 use apprentice::frontends::Client;
 use apprentice::ids::{StreamId, TenantId, UserId};
 use apprentice::language::Outcome;
@@ -174,11 +174,11 @@ fn an_erasure_that_a_crash_cut_short_is_finished_at_the_next_start() {
     let stream = store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap();
     store.keys.erase_user_key(&stream).unwrap();
     fs::write(dir.path().join(store::HISTORY_FILE), CANARIES[0]).unwrap();
-    let book = Book::open(store).unwrap();
+    let tenant_registry = TenantRegistry::open(store).unwrap();
     assert!(!dir.path().join(store::HISTORY_FILE).exists(), "what was typed goes too");
-    let registry = book.registry(&TenantId::local());
+    let registry = tenant_registry.registry(&TenantId::local());
     assert!(registry.erased().contains_key(&stream.key));
-    drop(book);
+    drop(tenant_registry);
     assert!(audit(dir.path()).streams.iter().all(|found| found.difference.is_none()));
 }
 
@@ -190,12 +190,12 @@ fn an_erasure_that_nobody_signed_and_a_key_that_came_back_are_seen_by_an_audit()
     service.stop().unwrap();
     let stream = stream_of(dir.path(), "ada");
     let key = fs::read(key_file(dir.path(), &stream)).unwrap();
-    let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
-    let erased = book.erase(&stream).unwrap();
-    assert_eq!(book.erase(&stream), Ok(erased), "doing it again is harmless");
+    let mut tenant_registry = TenantRegistry::open(store::open(dir.path()).unwrap()).unwrap();
+    let erased = tenant_registry.erase(&stream).unwrap();
+    assert_eq!(tenant_registry.erase(&stream), Ok(erased), "doing it again is harmless");
     let nobody = StreamId { key: apprentice::ids::StreamKey([1; 16]), ..stream.clone() };
-    assert!(matches!(book.erase(&nobody), Err(OrderError::NobodyThere { .. })));
-    drop(book);
+    assert!(matches!(tenant_registry.erase(&nobody), Err(OrderError::NobodyThere { .. })));
+    drop(tenant_registry);
     // From a backup.
     fs::write(key_file(dir.path(), &stream), key).unwrap();
     fs::remove_file(key_file(dir.path(), &stream).with_extension("erased")).unwrap();

@@ -11,8 +11,8 @@ use crate::support::diary::Diary;
 use crate::support::front::hand_in;
 use crate::support::toy::Bells;
 use apprentice::actors::{
-    AnswerTo, Ask, Book, Failure, House, HouseSettings, OrderError, Response, fold_tenant,
-    wall_clock,
+    ActorSettings, ActorSystem, AnswerTo, Ask, Failure, OrderError, Response, TenantRegistry,
+    fold_tenant, wall_clock,
 };
 use apprentice::events::{Batch, Event, EventKind, Head, Record, SessionClosed};
 use apprentice::evidence::{Proof, VerifyError, verify};
@@ -176,20 +176,24 @@ fn segments_are_a_function_of_the_records_and_closing_twice_is_closing_once() {
     let due = due_segments(&*store.log, &diary.stream, Seq::FIRST, Through::Episodes).unwrap();
     let ranges: Vec<(Seq, Seq)> = due.iter().map(|each| (each.first, each.last)).collect();
     assert_eq!(ranges, [(Seq::FIRST, ends[0]), (ends[0].next(), ends[1])]);
-    let mut book = Book::open(store.clone()).unwrap();
-    assert_eq!(book.close(&diary.stream, Through::Episodes), Ok(2));
-    assert_eq!(book.close(&diary.stream, Through::Episodes), Ok(0));
-    assert_eq!(book.close(&diary.stream, Through::Head), Ok(1), "the episode under way");
-    assert_eq!(book.close(&diary.stream, Through::Head), Ok(0));
-    assert_eq!(book.close(&StreamId::of_tenant(&local()), Through::Head), Ok(0));
-    let closed: Vec<_> =
-        book.registry(&local()).segments().iter().map(|each| each.closed.clone()).collect();
+    let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
+    assert_eq!(tenant_registry.close(&diary.stream, Through::Episodes), Ok(2));
+    assert_eq!(tenant_registry.close(&diary.stream, Through::Episodes), Ok(0));
+    assert_eq!(tenant_registry.close(&diary.stream, Through::Head), Ok(1), "the episode under way");
+    assert_eq!(tenant_registry.close(&diary.stream, Through::Head), Ok(0));
+    assert_eq!(tenant_registry.close(&StreamId::of_tenant(&local()), Through::Head), Ok(0));
+    let closed: Vec<_> = tenant_registry
+        .registry(&local())
+        .segments()
+        .iter()
+        .map(|each| each.closed.clone())
+        .collect();
     assert_eq!(closed[..2], due);
     // The next start finds the same.
-    let mut again = Book::open(store.clone()).unwrap();
-    assert_eq!(again.registry(&local()), book.registry(&local()));
+    let mut again = TenantRegistry::open(store.clone()).unwrap();
+    assert_eq!(again.registry(&local()), tenant_registry.registry(&local()));
     assert_eq!(again.close(&diary.stream, Through::Head), Ok(0));
-    let note = book.checkpoint(&local()).unwrap();
+    let note = tenant_registry.checkpoint(&local()).unwrap();
     assert_eq!(again.checkpoint(&local()), Ok(note.clone()), "the same tree is signed once");
     assert_eq!(store.checkpoints.all(&local()), Ok(vec![note]));
 }
@@ -202,11 +206,11 @@ fn a_record_that_is_not_covered_says_so_and_every_covered_one_is_proved() {
     let uncovered = proof(&store, &ada.stream, 1, None).unwrap_err();
     assert_eq!(uncovered, ProveError::NotCovered { seq: 1, covered: 0 });
     assert!(uncovered.to_string().contains("`apprentice checkpoint`"));
-    let mut book = Book::open(store.clone()).unwrap();
-    book.close(&ada.stream, Through::Episodes).unwrap();
+    let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
+    tenant_registry.close(&ada.stream, Through::Episodes).unwrap();
     assert_eq!(proof(&store, &ada.stream, 1, None).unwrap_err(), ProveError::Unsigned);
-    let older = book.checkpoint(&local()).unwrap();
-    book.close(&grace.stream, Through::Episodes).unwrap();
+    let older = tenant_registry.checkpoint(&local()).unwrap();
+    tenant_registry.close(&grace.stream, Through::Episodes).unwrap();
     let unsigned = proof(&store, &grace.stream, 1, None).unwrap_err();
     assert_eq!(unsigned, ProveError::NotSigned { seq: 1 });
     let next = ends[1].next().get();
@@ -215,7 +219,7 @@ fn a_record_that_is_not_covered_says_so_and_every_covered_one_is_proved() {
     let last = records.len() as u64;
     let absent = proof(&store, &ada.stream, last + 1, None).unwrap_err();
     assert_eq!(absent, ProveError::Absent { seq: last + 1, last });
-    book.sign(&local(), Through::Head).unwrap();
+    tenant_registry.sign(&local(), Through::Head).unwrap();
     let key = signer_of(&store, &local()).unwrap().public();
     for diary in [&ada, &grace] {
         for record in diary.records() {
@@ -235,8 +239,8 @@ fn a_record_that_is_not_covered_says_so_and_every_covered_one_is_proved() {
 fn changed_removed_and_reordered_records_are_caught_whoever_holds_the_keys() {
     let store = open_memory();
     let (ada, grace) = (life(&store, "ada"), life(&store, "grace"));
-    let mut book = Book::open(store.clone()).unwrap();
-    let signed = book.sign(&local(), Through::Head).unwrap();
+    let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
+    let signed = tenant_registry.sign(&local(), Through::Head).unwrap();
     let key = signer_of(&store, &local()).unwrap().public();
     let said = |record: &Record| record.event.kind() == EventKind::Interpreted;
     type Change<'c> = &'c dyn Fn(&mut Vec<Record>);
@@ -270,18 +274,19 @@ fn changed_removed_and_reordered_records_are_caught_whoever_holds_the_keys() {
         // on from there, neither a service nor a signature.
         let mut thorough = rewritten(&store, &ada.stream, change, true);
         let kept = std::mem::take(&mut thorough.checkpoints);
-        let mut book = Book::open(thorough.clone()).unwrap();
-        let forged = book.sign(&local(), Through::Head).unwrap();
+        let mut tenant_registry = TenantRegistry::open(thorough.clone()).unwrap();
+        let forged = tenant_registry.sign(&local(), Through::Head).unwrap();
         thorough.checkpoints = kept;
         let found = differences(&thorough);
         assert!(found.iter().any(|each| each.contains("newest checkpoint")), "{name}: {found:?}");
-        let refused = Book::open(thorough.clone()).map(|_| ()).unwrap_err();
+        let refused = TenantRegistry::open(thorough.clone()).map(|_| ()).unwrap_err();
         assert!(matches!(refused, OrderError::Evidence { .. }), "{name}: {refused}");
         // Even where the feed of checkpoints was forged too, whoever kept one is not deceived.
         let mut deceiving = thorough;
         deceiving.checkpoints = Arc::default();
         deceiving.checkpoints.append(&local(), &forged).unwrap();
-        let size = Book::open(store.clone()).unwrap().registry(&local()).segments().len() as u64;
+        let size =
+            TenantRegistry::open(store.clone()).unwrap().registry(&local()).segments().len() as u64;
         let shown = proof(&deceiving, &grace.stream, 3, None).unwrap();
         assert!(verify(&shown, &key, None).is_ok(), "{name}: the forger's own tree is in order");
         let caught = verify(&shown, &key, Some(&signed)).unwrap_err();
@@ -297,22 +302,22 @@ fn a_log_that_was_rolled_back_is_not_opened_not_signed_and_not_believed() {
     let (now, then) = (dir.path().join("now"), dir.path().join("then"));
     let store = open(&now).unwrap();
     let diary = life(&store, "ada");
-    Book::open(store.clone()).unwrap().sign(&local(), Through::Episodes).unwrap();
+    TenantRegistry::open(store.clone()).unwrap().sign(&local(), Through::Episodes).unwrap();
     let stream = diary.stream.clone();
     drop((diary, store));
     copy(&now, &then);
     // Time goes on, and a checkpoint is given out.
     let store = open(&now).unwrap();
-    let mut book = Book::open(store.clone()).unwrap();
-    let newest = book.sign(&local(), Through::Head).unwrap();
-    drop((book, store));
+    let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
+    let newest = tenant_registry.sign(&local(), Through::Head).unwrap();
+    drop((tenant_registry, store));
     // Somebody puts the old log back, under the checkpoints of today.
     fs::remove_dir_all(then.join("checkpoints")).unwrap();
     copy(&now.join("checkpoints"), &then.join("checkpoints"));
     let store = open(&then).unwrap();
     let found = differences(&store);
     assert!(found.iter().any(|each| each.contains("was rolled back")), "{found:?}");
-    let refused = Book::open(store.clone()).map(|_| ()).unwrap_err();
+    let refused = TenantRegistry::open(store.clone()).map(|_| ()).unwrap_err();
     let error = CheckpointsError::RolledBack { signed: 3, found: 2 };
     assert_eq!(refused, OrderError::Evidence { tenant: local(), error });
     assert!(matches!(proof(&store, &stream, 1, None), Err(ProveError::Checkpoints(_))));
@@ -328,7 +333,7 @@ fn a_log_that_was_rolled_back_is_not_opened_not_signed_and_not_believed() {
     // With its own old checkpoints it looks as good as ever, but not to whoever kept a newer one.
     fs::remove_dir_all(then.join("checkpoints")).unwrap();
     let store = open(&then).unwrap();
-    Book::open(store.clone()).unwrap().sign(&local(), Through::Episodes).unwrap();
+    TenantRegistry::open(store.clone()).unwrap().sign(&local(), Through::Episodes).unwrap();
     let shown = proof(&store, &stream, 1, None).unwrap();
     let key = signer_of(&store, &local()).unwrap().public();
     let caught = verify(&shown, &key, Some(&newest)).unwrap_err();
@@ -351,8 +356,8 @@ fn copy(from: &Path, to: &Path) {
 fn an_erased_person_leaves_every_proof_as_good_as_it_was() {
     let store = open_memory();
     let (ada, grace) = (life(&store, "ada"), life(&store, "grace"));
-    let mut book = Book::open(store.clone()).unwrap();
-    let older = book.sign(&local(), Through::Head).unwrap();
+    let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
+    let older = tenant_registry.sign(&local(), Through::Head).unwrap();
     let key = signer_of(&store, &local()).unwrap().public();
     let before = proof(&store, &ada.stream, 3, None).unwrap();
     store.erase(&ada.stream).unwrap();
@@ -362,15 +367,15 @@ fn an_erased_person_leaves_every_proof_as_good_as_it_was() {
         assert!(verify(&after, &key, Some(&older)).is_ok());
     }
     assert_eq!(proof(&store, &ada.stream, 3, None).unwrap(), before);
-    let registry = book.registry(&local());
+    let registry = tenant_registry.registry(&local());
     let record = Some((&ada.stream, Seq::new(3).unwrap()));
     let wanted = Wanted { record, reveal: true, since: None };
     let refused = prove(&store, &local(), &registry, &wanted).unwrap_err();
     assert!(refused.to_string().contains("was erased"), "{refused}");
 }
 
-fn house(store: Store) -> House {
-    House::start(HouseSettings {
+fn actors(store: Store) -> ActorSystem {
+    ActorSystem::start(ActorSettings {
         domain: Arc::new(Bells::new()),
         store,
         recipe_text: tiny().to_owned(),
@@ -383,19 +388,19 @@ fn house(store: Store) -> House {
     .unwrap()
 }
 
-fn ask(house: &House, ask: Ask) -> Response {
+fn ask(actors: &ActorSystem, ask: Ask) -> Response {
     let (sender, receiver) = mpsc::channel();
     let answer = AnswerTo::new(move |response| sender.send(response).unwrap());
     let (tenant, user) = (local(), UserId::new("ada").unwrap());
-    hand_in(&house.front(), (tenant, user), fresh_id(), ask, answer);
+    hand_in(&actors.front(), (tenant, user), fresh_id(), ask, answer);
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }
 
 /// Returns when the registrar has done all that was asked before.
-fn settled(house: &House) {
+fn settled(actors: &ActorSystem) {
     let (sender, receiver) = mpsc::channel();
     let order = apprentice::tenancy::Order::Open;
-    house.registrar().order(local(), order, move |obeyed| sender.send(obeyed).unwrap());
+    actors.registrar().order(local(), order, move |obeyed| sender.send(obeyed).unwrap());
     receiver.recv_timeout(Duration::from_secs(60)).unwrap().unwrap();
 }
 
@@ -403,7 +408,7 @@ fn settled(house: &House) {
 fn a_running_service_closes_segments_and_signs_by_itself() {
     let dir = tempfile::tempdir().unwrap();
     let store = open(dir.path()).unwrap();
-    let mut service = house(store);
+    let mut service = actors(store);
     let commands = [
         Command::StartEpisode { stage: Stage::Task { task: "Glass".to_owned(), seed: 1 } },
         Command::Say { utterance: "ring the brass bell".to_owned() },
@@ -434,7 +439,7 @@ fn what_a_crash_kept_from_being_closed_is_closed_at_the_next_waking() {
     let store = open_memory();
     let diary = life(&store, "ada");
     let ends = ends(&diary.records());
-    let mut service = house(store.clone());
+    let mut service = actors(store.clone());
     let response = ask(&service, Query::Status.into());
     assert!(!matches!(response, Response::Error(_)), "{response:?}");
     settled(&service);

@@ -7,7 +7,8 @@ use std::time::Duration;
 use crate::support::front::hand_in;
 use crate::support::toy::{self, Bells};
 use apprentice::actors::{
-    AnswerTo, Ask, ErrorCode, Failure, Front, House, HouseSettings, PersonAsk, Response, wall_clock,
+    ActorSettings, ActorSystem, AnswerTo, Ask, ErrorCode, Failure, Front, PersonAsk, Response,
+    wall_clock,
 };
 use apprentice::events::{Batch, Event, SessionClosed};
 use apprentice::frontends::fresh_id;
@@ -18,8 +19,8 @@ use apprentice::session::{Command, OnClash, Phase, Query, RejectionCode, Told};
 use apprentice::store::{self, Fault, FaultPlan, FaultyLog, Store};
 use apprentice::world::Stage;
 
-fn settings(store: Store, failure: &Failure) -> HouseSettings<Bells> {
-    HouseSettings {
+fn settings(store: Store, failure: &Failure) -> ActorSettings<Bells> {
+    ActorSettings {
         domain: Arc::new(Bells::new()),
         store,
         recipe_text: Recipe::builtin("tiny").unwrap().to_owned(),
@@ -31,8 +32,8 @@ fn settings(store: Store, failure: &Failure) -> HouseSettings<Bells> {
     }
 }
 
-fn house(store: Store, failure: &Failure) -> House {
-    House::start(settings(store, failure)).unwrap()
+fn actors(store: Store, failure: &Failure) -> ActorSystem {
+    ActorSystem::start(settings(store, failure)).unwrap()
 }
 
 /// A store in memory whose first appends go wrong as told.
@@ -89,8 +90,8 @@ fn say(utterance: &str) -> Command {
 fn a_log_that_is_busy_says_so_and_the_same_request_gets_through() {
     let failure = Failure::default();
     // The first append opens the stream, the second starts the episode.
-    let house = house(faulty(&[Fault::None, Fault::None, Fault::Refused]), &failure);
-    let front = house.front();
+    let actors = actors(faulty(&[Fault::None, Fault::None, Fault::Refused]), &failure);
+    let front = actors.front();
     assert!(matches!(insist(&front, start()), Response::Reply(_)));
     let request = fresh_id();
     let first = ask(&front, request, Ask::Person(PersonAsk::Command(say("ring the brass bell"))));
@@ -104,16 +105,16 @@ fn a_log_that_is_busy_says_so_and_the_same_request_gets_through() {
 #[test]
 fn opening_a_stream_is_tried_again_when_the_log_was_busy() {
     let failure = Failure::default();
-    let house = house(faulty(&[Fault::Refused]), &failure);
-    let Response::Reply(reply) = insist(&house.front(), start()) else { panic!("not started") };
+    let actors = actors(faulty(&[Fault::Refused]), &failure);
+    let Response::Reply(reply) = insist(&actors.front(), start()) else { panic!("not started") };
     assert_eq!(reply.first.get(), 2);
 }
 
 #[test]
 fn somebody_elses_append_is_noticed_and_a_new_actor_reads_it() {
     let (store, failure) = (store::open_memory(), Failure::default());
-    let house = house(store.clone(), &failure);
-    let front = house.front();
+    let actors = actors(store.clone(), &failure);
+    let front = actors.front();
     assert!(matches!(insist(&front, start()), Response::Reply(_)));
     let stream = store.keys.stream_id(&TenantId::local(), &ada()).unwrap();
     let after = store.log.head(&stream).unwrap();
@@ -138,8 +139,8 @@ fn somebody_elses_append_is_noticed_and_a_new_actor_reads_it() {
 fn a_log_that_dies_stops_the_service_and_nobody_gets_a_reply() {
     for fault in [Fault::CrashBefore, Fault::CrashAfter, Fault::Unacknowledged] {
         let failure = Failure::default();
-        let house = house(faulty(&[Fault::None, Fault::None, fault]), &failure);
-        let front = house.front();
+        let actors = actors(faulty(&[Fault::None, Fault::None, fault]), &failure);
+        let front = actors.front();
         assert!(matches!(insist(&front, start()), Response::Reply(_)));
         let answer =
             ask(&front, fresh_id(), Ask::Person(PersonAsk::Command(say("ring the brass bell"))));
@@ -178,15 +179,15 @@ fn a_training_that_panics_leaves_the_mind_as_it_was() {
 #[test]
 fn whoever_sleeps_goes_on_where_they_were() {
     let (store, failure) = (store::open_memory(), Failure::default());
-    let status = |house: &House| match ask(
-        &house.front(),
+    let status = |actors: &ActorSystem| match ask(
+        &actors.front(),
         fresh_id(),
         Ask::Person(PersonAsk::Query(Query::Status)),
     ) {
         Response::Status(status) => status,
         other => panic!("{other:?}"),
     };
-    let mut first = house(store.clone(), &failure);
+    let mut first = actors(store.clone(), &failure);
     assert!(matches!(insist(&first.front(), start()), Response::Reply(_)));
     assert!(matches!(insist(&first.front(), say("ring the brass bell")), Response::Reply(_)));
     let before = status(&first);
@@ -195,9 +196,9 @@ fn whoever_sleeps_goes_on_where_they_were() {
     assert_eq!(first.awake(), 0);
     // With the snapshot that falling asleep left behind, and without it.
     let stream = store.keys.stream_id(&TenantId::local(), &ada()).unwrap();
-    assert_eq!(status(&house(store.clone(), &Failure::default())), before);
+    assert_eq!(status(&actors(store.clone(), &Failure::default())), before);
     store.snapshots.forget(&stream).unwrap();
-    assert_eq!(status(&house(store, &Failure::default())), before);
+    assert_eq!(status(&actors(store, &Failure::default())), before);
 }
 
 /// A person of a lab.
@@ -223,13 +224,13 @@ fn teach(front: &Front, who: &(TenantId, UserId)) {
 fn one_labs_flood_of_trainings_delays_anothers_by_the_one_that_runs() {
     const FLOOD: usize = 20;
     let (store, failure, gate) = (store::open_memory(), Failure::default(), Arc::default());
-    let house = House::start(HouseSettings {
+    let actors = ActorSystem::start(ActorSettings {
         domain: Arc::new(Bells::slow(Arc::clone(&gate))),
         awake_max: 2 * FLOOD,
         ..settings(store.clone(), &failure)
     })
     .unwrap();
-    let front = house.front();
+    let front = actors.front();
     let people: Vec<_> =
         (0..FLOOD).map(|n| person("flood", n)).chain([person("quiet", 0)]).collect();
     people.iter().for_each(|who| teach(&front, who));

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::support::front::hand_in;
 use crate::support::toy::{self, Bells, Gate};
 use apprentice::actors::{
-    AnswerTo, Ask, DoorAsk, Failure, Front, House, HouseSettings, PersonAsk, Quota, Refusals,
+    ActorSettings, ActorSystem, AnswerTo, Ask, DoorAsk, Failure, Front, PersonAsk, Quota, Refusals,
     Registrar, Response, wall_clock,
 };
 use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
@@ -22,9 +22,9 @@ use apprentice::world::Stage;
 
 const LONG: Duration = Duration::from_secs(30);
 
-fn house(store: Store, gate: Option<&Arc<Gate>>) -> House {
+fn actors(store: Store, gate: Option<&Arc<Gate>>) -> ActorSystem {
     let domain = gate.map_or_else(Bells::new, |gate| Bells::slow(gate.clone()));
-    House::start(HouseSettings {
+    ActorSystem::start(ActorSettings {
         domain: Arc::new(domain),
         store,
         recipe_text: Recipe::builtin("tiny").unwrap().to_owned(),
@@ -52,10 +52,10 @@ fn obey(registrar: &Registrar, tenant: &TenantId, order: Order) {
 }
 
 /// Labs with these quotas.
-fn allow(house: &House, labs: &[(&TenantId, Quotas)]) {
+fn allow(actors: &ActorSystem, labs: &[(&TenantId, Quotas)]) {
     for (tenant, quotas) in labs {
-        obey(house.registrar(), tenant, Order::Open);
-        obey(house.registrar(), tenant, Order::SetQuotas(*quotas));
+        obey(actors.registrar(), tenant, Order::Open);
+        obey(actors.registrar(), tenant, Order::SetQuotas(*quotas));
     }
 }
 
@@ -167,18 +167,18 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
 #[test]
 fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
     let (gate, store) = (Arc::<Gate>::default(), store::open_memory());
-    let house = house(store, Some(&gate));
+    let actors = actors(store, Some(&gate));
     let (full, other) = (lab("full"), lab("other"));
     let quotas = Quotas { awake_users: Some(2), ..Quotas::default() };
-    allow(&house, &[(&full, quotas), (&other, Quotas::default())]);
-    let front = house.front();
+    allow(&actors, &[(&full, quotas), (&other, Quotas::default())]);
+    let front = actors.front();
     let status = |tenant: &TenantId, number| ask(&front, tenant, number, fresh_id(), STATUS);
     assert!(matches!(status(&other, 0), Response::Status(_)), "the longest idle of all");
     for number in 0..6 {
         assert!(matches!(status(&full, number), Response::Status(_)), "an idle one makes room");
     }
-    assert_eq!(house.usage()[&full].awake_users, 2);
-    assert_eq!(house.usage()[&other].awake_users, 1, "untouched, though idle for longest");
+    assert_eq!(actors.usage()[&full].awake_users, 2);
+    assert_eq!(actors.usage()[&other].awake_users, 1, "untouched, though idle for longest");
 
     // Two who are learning cannot be put to sleep, so a third must wait; other labs need not.
     for number in [4, 5] {
@@ -210,7 +210,7 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
     for number in 0..10 {
         assert!(matches!(status(&other, number), Response::Status(_)));
     }
-    assert_eq!(house.usage()[&full].refused.awake_users, 1);
+    assert_eq!(actors.usage()[&full].refused.awake_users, 1);
     gate.open();
     let wait = Ask::Person(PersonAsk::Wait { seconds: 30 });
     for number in [4, 5] {
@@ -226,11 +226,11 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
 #[test]
 fn requests_in_flight_are_bounded_for_each_lab() {
     let gate = Arc::<Gate>::default();
-    let house = house(store::open_memory(), Some(&gate));
+    let actors = actors(store::open_memory(), Some(&gate));
     let (full, other) = (lab("full"), lab("other"));
     let quotas = Quotas { in_flight: Some(3), ..Quotas::default() };
-    allow(&house, &[(&full, quotas), (&other, Quotas::default())]);
-    let front = house.front();
+    allow(&actors, &[(&full, quotas), (&other, Quotas::default())]);
+    let front = actors.front();
     let told = |command: Command| match ask(&front, &full, 0, fresh_id(), command.into()) {
         Response::Reply(reply) => reply.first,
         other => panic!("{other:?}"),
@@ -313,10 +313,10 @@ fn holdings(store: &Store, tenant: &TenantId) -> (u64, usize) {
 #[test]
 fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
     let store = store::open_memory();
-    let house = house(store.clone(), None);
+    let actors = actors(store.clone(), None);
     let lab = lab("lab");
-    allow(&house, &[(&lab, Quotas::default())]);
-    let (front, before) = (house.front(), holdings(&store, &lab));
+    allow(&actors, &[(&lab, Quotas::default())]);
+    let (front, before) = (actors.front(), holdings(&store, &lab));
     let wait = Ask::Person(PersonAsk::Wait { seconds: 1 });
     for number in 0..50 {
         for asked in [

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 
 use apprentice::actors::{
-    Book, DirectoryEffect, DirectoryInput, Effect, ErrorCode, Input, Letter, NotDelivered,
-    OrderError, PersonAsk, Response, Undelivered, wall_clock,
+    DirectoryEffect, DirectoryInput, Effect, ErrorCode, Input, Letter, NotDelivered, OrderError,
+    PersonAsk, Response, TenantRegistry, Undelivered, wall_clock,
 };
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Seq, StreamId, TenantId, Timestamp};
@@ -544,14 +544,15 @@ impl System {
     }
 
     /// A process's tenant registry; none when its log refuses just now.
-    fn registry(&mut self, process: usize) -> Result<Option<&mut Book>, Broken> {
+    fn registry(&mut self, process: usize) -> Result<Option<&mut TenantRegistry>, Broken> {
         let holder = &mut self.processes[process];
         if holder.registry.is_none() {
-            let mut registry = match Book::open_by(self.registry_store.clone(), wall_clock()) {
-                Ok(registry) => registry,
-                Err(OrderError::Append { .. }) => return Ok(None),
-                Err(error) => return Err(broken(Invariant::FoldAgrees, error.to_string())),
-            };
+            let mut registry =
+                match TenantRegistry::open_by(self.registry_store.clone(), wall_clock()) {
+                    Ok(registry) => registry,
+                    Err(OrderError::Append { .. }) => return Ok(None),
+                    Err(error) => return Err(broken(Invariant::FoldAgrees, error.to_string())),
+                };
             for name in ["bells", "chimes"] {
                 let tenant = TenantId::new(name).unwrap();
                 let opened = registry.obey(&tenant, &apprentice::tenancy::Order::Open);

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use apprentice::actors::{
-    Attention, Book, Directory, DirectoryInput, NewSession, PersonAsk, Presence, Seat, Timer,
+    Attention, Directory, DirectoryInput, NewSession, PersonAsk, Presence, Seat, TenantRegistry,
+    Timer,
 };
 use apprentice::ids::{Digest, RequestId, StreamId, UserId};
 use apprentice::learning::{Lesson, Mind, Recipe};
@@ -27,7 +28,7 @@ pub struct Process {
     pub actors: BTreeMap<u64, Actor>,
     pub minds: Minds,
     /// None until it is needed, and when it could not be read.
-    pub registry: Option<Book>,
+    pub registry: Option<TenantRegistry>,
     /// Numbers of the requests that this process has taken and not answered.
     pub unanswered: BTreeSet<u64>,
     /// It was told to stop: whoever sleeps stays asleep.

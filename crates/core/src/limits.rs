@@ -105,7 +105,7 @@ pub const GATEWAY_IN_FLIGHT_MAX: usize = 8_192;
 pub const DIRECTORY_QUEUE_MAX: usize = 2 * GATEWAY_IN_FLIGHT_MAX;
 /// Places in the log of one tenant alone that wait to be published; then they are left out, and
 /// followers fetch them.
-pub const GROWTHS_WAITING_MAX: usize = 4_096;
+pub const NOTIFICATIONS_WAITING_MAX: usize = 4_096;
 /// Messages of the feed that wait for one subscriber; then it misses some, and fetches them.
 pub const FEED_WAITING_MAX: i32 = 512;
 /// Bytes of answers of one tenant alone that wait to leave the process; several tenants together

@@ -8,7 +8,7 @@ use crate::ids::UserId;
 
 /// The keys for a service that admits only known keys.
 #[derive(Debug, Args)]
-pub struct Passport {
+pub struct Credentials {
     /// Your key file, made by `apprentice keys new`.
     #[arg(long, value_name = "FILE", requires = "server_key")]
     key: Option<PathBuf>,
@@ -17,7 +17,7 @@ pub struct Passport {
     server_key: Option<String>,
 }
 
-impl Passport {
+impl Credentials {
     pub fn is_given(&self) -> bool {
         self.key.is_some() || self.server_key.is_some()
     }

@@ -5,12 +5,12 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use crate::events::Durable;
 use crate::fairness::{Room, Turns};
 use crate::ids::{Seq, StreamId, TenantId};
-use crate::limits::GROWTHS_WAITING_MAX;
+use crate::limits::NOTIFICATIONS_WAITING_MAX;
 
 /// What became durable, for whoever publishes it: places in the log, no content. Noting costs the
 /// writer a lock and no I/O. What finds the queue full is counted and left out; nobody waits.
 #[derive(Clone, Default)]
-pub struct Growths(Arc<Inner>);
+pub struct CommitNotifications(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
@@ -20,7 +20,7 @@ struct Inner {
 }
 
 struct Waiting {
-    turns: Turns<Growth>,
+    turns: Turns<CommitNotification>,
     room: Room,
     /// Records noted for each tenant, the ones left out included.
     numbers: BTreeMap<TenantId, u64>,
@@ -29,7 +29,7 @@ struct Waiting {
 
 /// The records `first` to `last` of a stream are durable.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Growth {
+pub struct CommitNotification {
     pub stream: StreamId,
     pub first: Seq,
     pub last: Seq,
@@ -40,12 +40,12 @@ pub struct Growth {
 
 impl Default for Waiting {
     fn default() -> Waiting {
-        let room = Room::new(GROWTHS_WAITING_MAX);
+        let room = Room::new(NOTIFICATIONS_WAITING_MAX);
         Waiting { turns: Turns::default(), room, numbers: BTreeMap::new(), left_out: 0 }
     }
 }
 
-impl Growths {
+impl CommitNotifications {
     /// From now on what grows is kept, and `wake` is called for each.
     pub fn listen(&self, wake: impl Fn() + Send + Sync + 'static) {
         let _ = self.0.wake.set(Box::new(wake));
@@ -56,15 +56,19 @@ impl Growths {
         let Some(wake) = self.0.wake.get() else { return };
         let records = durable.records();
         let (Some(first), Some(last)) = (records.first(), records.last()) else { return };
-        let growth =
-            |number| Growth { stream: stream.clone(), first: first.seq, last: last.seq, number };
+        let notification = |number| CommitNotification {
+            stream: stream.clone(),
+            first: first.seq,
+            last: last.seq,
+            number,
+        };
         {
             let waiting = &mut *self.waiting();
             let number = waiting.numbers.entry(stream.tenant.clone()).or_default();
-            let growth = growth(*number + 1);
+            let notification = notification(*number + 1);
             *number += records.len() as u64;
             if waiting.room.take(&stream.tenant, 1) {
-                waiting.turns.push(&stream.tenant, growth);
+                waiting.turns.push(&stream.tenant, notification);
             } else {
                 waiting.left_out += records.len() as u64;
             }
@@ -72,12 +76,12 @@ impl Growths {
         wake();
     }
 
-    /// The next growth; tenants take turns.
-    pub fn next(&self) -> Option<Growth> {
+    /// The next notification; tenants take turns.
+    pub fn next(&self) -> Option<CommitNotification> {
         let mut waiting = self.waiting();
-        let growth = waiting.turns.pop()?;
-        waiting.room.give_back(&growth.stream.tenant, 1);
-        Some(growth)
+        let notification = waiting.turns.pop()?;
+        waiting.room.give_back(&notification.stream.tenant, 1);
+        Some(notification)
     }
 
     /// How many records were noted for each tenant; none while some of them are still to be taken.
@@ -96,9 +100,9 @@ impl Growths {
     }
 }
 
-impl fmt::Debug for Growths {
+impl fmt::Debug for CommitNotifications {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Growths(..)")
+        f.write_str("CommitNotifications(..)")
     }
 }
 
@@ -124,27 +128,27 @@ mod tests {
         for tenant in [&a, &b] {
             store.keys.make_tenant(tenant).unwrap();
         }
-        let growths = Growths::default();
+        let notifications = CommitNotifications::default();
         let [a, b] = [&a, &b].map(StreamId::of_tenant);
         let once = durable(&*store.log, &a, Head::EMPTY);
-        growths.note(&a, &once);
-        assert_eq!(growths.next(), None, "nobody listens");
+        notifications.note(&a, &once);
+        assert_eq!(notifications.next(), None, "nobody listens");
         let woken = Arc::new(AtomicUsize::new(0));
         let counter = woken.clone();
-        growths.listen(move || {
+        notifications.listen(move || {
             counter.fetch_add(1, Ordering::SeqCst);
         });
-        let flood = 3 * GROWTHS_WAITING_MAX;
-        (0..flood).for_each(|_| growths.note(&a, &once));
-        growths.note(&b, &durable(&*store.log, &b, Head::EMPTY));
+        let flood = 3 * NOTIFICATIONS_WAITING_MAX;
+        (0..flood).for_each(|_| notifications.note(&a, &once));
+        notifications.note(&b, &durable(&*store.log, &b, Head::EMPTY));
         assert_eq!(woken.load(Ordering::SeqCst), flood + 1);
-        assert!(growths.left_out() > 0 && growths.all_taken().is_none());
-        assert_eq!(growths.next().map(|it| (it.stream, it.number)), Some((a.clone(), 1)));
-        assert_eq!(growths.next().map(|it| (it.stream, it.number)), Some((b.clone(), 1)));
-        while growths.next().is_some() {}
-        growths.note(&a, &once);
-        let last = growths.next().unwrap();
+        assert!(notifications.left_out() > 0 && notifications.all_taken().is_none());
+        assert_eq!(notifications.next().map(|it| (it.stream, it.number)), Some((a.clone(), 1)));
+        assert_eq!(notifications.next().map(|it| (it.stream, it.number)), Some((b.clone(), 1)));
+        while notifications.next().is_some() {}
+        notifications.note(&a, &once);
+        let last = notifications.next().unwrap();
         assert_eq!(last.number, flood as u64 + 1, "what was left out has its numbers");
-        assert_eq!(growths.all_taken().unwrap()[&a.tenant], flood as u64 + 1);
+        assert_eq!(notifications.all_taken().unwrap()[&a.tenant], flood as u64 + 1);
     }
 }

@@ -19,8 +19,8 @@ use super::shared::{Common, Shared};
 use super::trainer::Trainer;
 use super::user::UserActor;
 use super::{
-    AnswerTo, ArchiveAsk, Ask, Book, Erased, Failure, Growths, Hello, OrderError, Registrar,
-    Response, Submit,
+    AnswerTo, ArchiveAsk, Ask, CommitNotifications, Erased, Failure, Hello, OrderError, Registrar,
+    Response, Submit, TenantRegistry,
 };
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::{self, Mind, Recipe};
@@ -30,11 +30,11 @@ use crate::tenancy::Clock;
 use crate::world::Domain;
 
 /// Everybody who is awake, on an actix system with a thread of its own.
-pub struct House {
+pub struct ActorSystem {
     directory: Addr<DirectoryActor>,
     registrar: Registrar,
     meters: Arc<Meters>,
-    growths: Growths,
+    notifications: CommitNotifications,
     reader: Option<Reader>,
     archive: Archive,
     system: System,
@@ -56,7 +56,7 @@ pub struct Wakings {
 }
 
 /// What the actors are started with.
-pub struct HouseSettings<D: Domain> {
+pub struct ActorSettings<D: Domain> {
     pub domain: Arc<D>,
     pub store: Store,
     /// What new people start with.
@@ -102,7 +102,7 @@ pub enum NotTaken {
 }
 
 impl Front {
-    /// As [`House::erase`]; when everybody is gone, `answer` is dropped.
+    /// As [`ActorSystem::erase`]; when everybody is gone, `answer` is dropped.
     pub fn erase(
         &self,
         tenant: TenantId,
@@ -163,10 +163,10 @@ const FALL_ASLEEP: Duration = Duration::from_secs(30);
 /// still do in order would be kept.
 const FALL_DOWN: Duration = Duration::from_millis(200);
 
-impl House {
+impl ActorSystem {
     /// Trains the base mind, so that nobody ever waits for it, and starts the actors.
-    pub fn start<D: Domain>(settings: HouseSettings<D>) -> Result<House, ActorsError> {
-        let HouseSettings {
+    pub fn start<D: Domain>(settings: ActorSettings<D>) -> Result<ActorSystem, ActorsError> {
+        let ActorSettings {
             domain,
             store,
             recipe_text,
@@ -187,9 +187,9 @@ impl House {
         let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
         let minds = Arc::<Minds>::default();
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
-        let book = Book::open_by(store.clone(), clock)?;
-        let meters = Arc::new(Meters::new(book.admissions().clone(), store.log.clone()));
-        let growths = book.growths().clone();
+        let tenant_registry = TenantRegistry::open_by(store.clone(), clock)?;
+        let meters = Arc::new(Meters::new(tenant_registry.admissions().clone(), store.log.clone()));
+        let notifications = tenant_registry.notifications().clone();
         let reader = Reader::new(store.log.clone());
         let base = base_mind(&*domain, &recipe)?;
         let common = Common {
@@ -198,7 +198,7 @@ impl House {
             new: Arc::new(NewSession { recipe, recipe_text, base }),
             minds: minds.clone(),
             meters: meters.clone(),
-            growths: growths.clone(),
+            notifications: notifications.clone(),
             failure: failure.clone(),
             _open: lives.enter(),
         };
@@ -207,7 +207,7 @@ impl House {
 
         let (started, ready) = mpsc::channel();
         let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
-        let (failed, book_open) = (failure.clone(), lives.enter());
+        let (failed, registry_open) = (failure.clone(), lives.enter());
         let measured = meters.clone();
         let thread = thread::Builder::new()
             .name("actors".to_owned())
@@ -215,7 +215,7 @@ impl House {
                 let _alarm = alarm;
                 let system = System::new();
                 let (directory, registrar) = system.block_on(async move {
-                    let registrar = Registrar::start(book, book_open, failed);
+                    let registrar = Registrar::start(tenant_registry, registry_open, failed);
                     let trainer = |shared: Arc<Shared<D>>, trainers| {
                         SyncArbiter::start(trainers, move || Trainer { shared: shared.clone() })
                     };
@@ -246,11 +246,11 @@ impl House {
             .recv()
             .map_err(|_| ActorsError::System { reason: "their thread ended at once".to_owned() })?;
         let thread = Some(thread);
-        Ok(House {
+        Ok(ActorSystem {
             directory,
             registrar,
             meters,
-            growths,
+            notifications,
             reader: Some(reader),
             archive,
             system,
@@ -273,8 +273,8 @@ impl House {
     }
 
     /// What became durable, for one listener.
-    pub fn growths(&self) -> &Growths {
-        &self.growths
+    pub fn notifications(&self) -> &CommitNotifications {
+        &self.notifications
     }
 
     /// Reads what is durable; none after a stop. To be dropped before one.
@@ -349,7 +349,7 @@ impl House {
     }
 }
 
-impl Drop for House {
+impl Drop for ActorSystem {
     fn drop(&mut self) {
         self.stop();
     }

@@ -3,10 +3,10 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::credentials::Credentials;
 use super::failure::Failure;
-use super::passport::Passport;
 use super::{data_dir, embedded};
-use crate::actors::{Book, ErrorCode, OrderError, TenantView};
+use crate::actors::{ErrorCode, OrderError, TenantRegistry, TenantView};
 use crate::events::PersonErased;
 use crate::frontends::{Client, ClientError};
 use crate::ids::{TenantId, UserId};
@@ -23,27 +23,27 @@ pub struct Place {
     #[arg(long, value_name = "ENDPOINT", conflicts_with = "data")]
     connect: Option<String>,
     #[command(flatten)]
-    passport: Passport,
+    credentials: Credentials,
     /// A data directory that no service has open
     /// [default: $XDG_DATA_HOME/apprentice, else ~/.local/share/apprentice]
     #[arg(long, value_name = "DIR", conflicts_with_all = ["key", "server_key"])]
     data: Option<PathBuf>,
 }
 
-/// What carries orders out: the [`Book`] of a running service, or of a closed directory.
-pub enum Office {
+/// What carries orders out: the [`TenantRegistry`] of a running service, or of a closed directory.
+pub enum AdminClient {
     Running(Client),
-    Closed(Box<Book>),
+    Closed(Box<TenantRegistry>),
 }
 
 impl Place {
     /// - `make`: whether to make a data directory that does not exist.
-    pub fn enter(&self, make: bool) -> Result<Office, Failure> {
+    pub fn enter(&self, make: bool) -> Result<AdminClient, Failure> {
         if let Some(endpoint) = &self.connect {
-            let client = self.passport.client(endpoint, embedded::user("operator")?)?;
-            return Ok(Office::Running(client.with_patience(PATIENCE)));
+            let client = self.credentials.client(endpoint, embedded::user("operator")?)?;
+            return Ok(AdminClient::Running(client.with_patience(PATIENCE)));
         }
-        if self.passport.is_given() {
+        if self.credentials.is_given() {
             return Err(Failure::bad_input(
                 "--key is for a running service; name the service with --connect",
             ));
@@ -58,21 +58,21 @@ impl Place {
             )),
             error => Failure::bad_input(error),
         })?;
-        let book = Book::open(store).map_err(Failure::failed)?;
-        Ok(Office::Closed(Box::new(book)))
+        let tenant_registry = TenantRegistry::open(store).map_err(Failure::failed)?;
+        Ok(AdminClient::Closed(Box::new(tenant_registry)))
     }
 }
 
-impl Office {
+impl AdminClient {
     /// - returns: how many records were added; 0 when the order changed nothing.
     pub fn obey(&mut self, tenant: &TenantId, order: Order) -> Result<u32, Failure> {
         match self {
-            Office::Running(client) => {
+            AdminClient::Running(client) => {
                 let ordered = client.order(Some(tenant.clone()), order).map_err(Failure::failed)?;
                 Ok(ordered.recorded)
             }
-            Office::Closed(book) => {
-                let events = book.obey(tenant, &order).map_err(Failure::failed)?;
+            AdminClient::Closed(tenant_registry) => {
+                let events = tenant_registry.obey(tenant, &order).map_err(Failure::failed)?;
                 Ok(events.len() as u32)
             }
         }
@@ -81,7 +81,7 @@ impl Office {
     /// - errors: with code 2, when there is no such person.
     pub fn erase(&mut self, tenant: &TenantId, user: &UserId) -> Result<PersonErased, Failure> {
         match self {
-            Office::Running(client) => {
+            AdminClient::Running(client) => {
                 let erased = client.erase(Some(tenant.clone()), user.clone());
                 erased.map(|view| view.erased).map_err(|error| match error {
                     ClientError::Failed { code: ErrorCode::Refused, .. } => {
@@ -90,9 +90,9 @@ impl Office {
                     error => Failure::failed(error),
                 })
             }
-            Office::Closed(book) => {
-                let stream = book.stream_id(tenant, user).map_err(Failure::bad_input)?;
-                book.erase(&stream).map_err(|error| match error {
+            AdminClient::Closed(tenant_registry) => {
+                let stream = tenant_registry.stream_id(tenant, user).map_err(Failure::bad_input)?;
+                tenant_registry.erase(&stream).map_err(|error| match error {
                     OrderError::NobodyThere { .. } => Failure::bad_input(error),
                     error => Failure::failed(error),
                 })
@@ -102,8 +102,10 @@ impl Office {
 
     pub fn list(&mut self, only: Option<&TenantId>) -> Result<Vec<TenantView>, Failure> {
         match self {
-            Office::Running(client) => client.tenants(only.cloned()).map_err(Failure::failed),
-            Office::Closed(book) => Ok(TenantView::list(book.admissions(), only)),
+            AdminClient::Running(client) => client.tenants(only.cloned()).map_err(Failure::failed),
+            AdminClient::Closed(tenant_registry) => {
+                Ok(TenantView::list(tenant_registry.admissions(), only))
+            }
         }
     }
 }

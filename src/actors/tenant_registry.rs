@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::shared::fresh_request;
-use super::{Growths, wall_clock};
+use super::{CommitNotifications, wall_clock};
 use crate::events::{Batch, Event, Head, PersonErased};
 use crate::evidence::{self, Checkpoint, Tree};
 use crate::ids::{IdError, Seq, StreamId, TenantId, UserId};
@@ -11,11 +11,11 @@ use crate::tenancy::{self, Admissions, Clock, Disagreement, Order, Refusal, Regi
 
 /// The tenants of a store and their own streams, of which this is the only writer. A running
 /// service has one, behind its registrar; so has a command about a closed directory.
-pub struct Book {
+pub struct TenantRegistry {
     store: Store,
     registries: BTreeMap<TenantId, Registry>,
     admissions: Admissions,
-    growths: Growths,
+    notifications: CommitNotifications,
 }
 
 /// Why an order was not carried out.
@@ -49,34 +49,34 @@ pub enum OrderError {
     Busy,
 }
 
-impl Book {
+impl TenantRegistry {
     /// Folds every tenant's own stream.
-    pub fn open(store: Store) -> Result<Book, OrderError> {
-        Book::open_by(store, wall_clock())
+    pub fn open(store: Store) -> Result<TenantRegistry, OrderError> {
+        TenantRegistry::open_by(store, wall_clock())
     }
 
-    /// As [`Book::open`], by another clock than the machine's.
-    pub fn open_by(store: Store, clock: Clock) -> Result<Book, OrderError> {
-        let mut book = Book {
+    /// As [`TenantRegistry::open`], by another clock than the machine's.
+    pub fn open_by(store: Store, clock: Clock) -> Result<TenantRegistry, OrderError> {
+        let mut tenant_registry = TenantRegistry {
             store,
             registries: BTreeMap::new(),
             admissions: Admissions::new(clock),
-            growths: Growths::default(),
+            notifications: CommitNotifications::default(),
         };
         let local = TenantId::local();
-        let tenants = book.store.log.tenants();
+        let tenants = tenant_registry.store.log.tenants();
         let tenants = tenants.map_err(|error| OrderError::Read { tenant: local, error })?;
         for tenant in tenants {
-            let registry = fold(&book.store, &tenant)?;
+            let registry = fold(&tenant_registry.store, &tenant)?;
             // Going on with a log that is not the one that was signed could never be mended.
-            replay::newest_checkpoint(&book.store, &tenant, &registry)
+            replay::newest_checkpoint(&tenant_registry.store, &tenant, &registry)
                 .map_err(|error| OrderError::Evidence { tenant: tenant.clone(), error })?;
-            count_bytes(&book.store, &tenant, &registry);
-            book.admissions.update(&tenant, registry.standing());
-            book.registries.insert(tenant, registry);
+            count_bytes(&tenant_registry.store, &tenant, &registry);
+            tenant_registry.admissions.update(&tenant, registry.standing());
+            tenant_registry.registries.insert(tenant, registry);
         }
-        book.finish_erasures()?;
-        Ok(book)
+        tenant_registry.finish_erasures()?;
+        Ok(tenant_registry)
     }
 
     pub fn admissions(&self) -> &Admissions {
@@ -84,8 +84,8 @@ impl Book {
     }
 
     /// Who is told of what became durable.
-    pub fn growths(&self) -> &Growths {
-        &self.growths
+    pub fn notifications(&self) -> &CommitNotifications {
+        &self.notifications
     }
 
     /// The stream of a person.
@@ -176,7 +176,7 @@ impl Book {
         count_bytes(&self.store, tenant, registry);
         self.admissions.update(tenant, registry.standing());
         // After the doors know: whoever's key was taken back with this gets no record any more.
-        self.growths.note(&stream, &durable);
+        self.notifications.note(&stream, &durable);
         Ok(events)
     }
 
@@ -351,50 +351,50 @@ mod tests {
     fn what_was_ordered_stands_after_a_restart() {
         let dir = tempfile::tempdir().unwrap();
         let quotas = Quotas { awake_users: Some(2), ..Quotas::default() };
-        let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
+        let mut tenant_registry = TenantRegistry::open(store::open(dir.path()).unwrap()).unwrap();
         for order in [Order::Open, admit(KEY), Order::SetQuotas(quotas)] {
-            assert_eq!(book.obey(&lab(), &order).unwrap().len(), 1);
-            assert_eq!(book.obey(&lab(), &order), Ok(vec![]));
+            assert_eq!(tenant_registry.obey(&lab(), &order).unwrap().len(), 1);
+            assert_eq!(tenant_registry.obey(&lab(), &order), Ok(vec![]));
         }
-        let before = book.registry(&lab());
-        drop(book);
-        let book = Book::open(store::open(dir.path()).unwrap()).unwrap();
-        assert_eq!(book.registry(&lab()), before);
-        let admitted = book.admissions().admit(&KEY).unwrap();
+        let before = tenant_registry.registry(&lab());
+        drop(tenant_registry);
+        let tenant_registry = TenantRegistry::open(store::open(dir.path()).unwrap()).unwrap();
+        assert_eq!(tenant_registry.registry(&lab()), before);
+        let admitted = tenant_registry.admissions().admit(&KEY).unwrap();
         assert_eq!((admitted.tenant, admitted.role), (lab(), Role::Gateway));
     }
 
     #[test]
     fn nothing_is_done_to_a_tenant_that_does_not_exist_and_no_secret_is_made_for_it() {
         let dir = tempfile::tempdir().unwrap();
-        let mut book = Book::open(store::open(dir.path()).unwrap()).unwrap();
-        let refusal = book.obey(&lab(), &admit(KEY)).unwrap_err().to_string();
+        let mut tenant_registry = TenantRegistry::open(store::open(dir.path()).unwrap()).unwrap();
+        let refusal = tenant_registry.obey(&lab(), &admit(KEY)).unwrap_err().to_string();
         assert!(refusal.contains("add it first"), "{refusal}");
         assert!(!dir.path().join("keys/lab.key").exists());
         // Being named once too early is no obstacle to being added.
-        book.obey(&lab(), &Order::Open).unwrap();
+        tenant_registry.obey(&lab(), &Order::Open).unwrap();
         assert!(dir.path().join("keys/lab.key").exists());
-        book.obey(&lab(), &admit(KEY)).unwrap();
+        tenant_registry.obey(&lab(), &admit(KEY)).unwrap();
     }
 
     #[test]
     fn the_tenant_of_this_machine_need_not_be_added() {
-        let mut book = Book::open(store::open_memory()).unwrap();
-        assert_eq!(book.obey(&TenantId::local(), &admit(KEY)).unwrap().len(), 1);
-        assert!(book.registry(&TenantId::local()).is_open());
+        let mut tenant_registry = TenantRegistry::open(store::open_memory()).unwrap();
+        assert_eq!(tenant_registry.obey(&TenantId::local(), &admit(KEY)).unwrap().len(), 1);
+        assert!(tenant_registry.registry(&TenantId::local()).is_open());
     }
 
     #[test]
     fn one_key_is_one_labs() {
-        let mut book = Book::open(store::open_memory()).unwrap();
+        let mut tenant_registry = TenantRegistry::open(store::open_memory()).unwrap();
         let other = TenantId::new("other").unwrap();
         for tenant in [lab(), other.clone()] {
-            book.obey(&tenant, &Order::Open).unwrap();
+            tenant_registry.obey(&tenant, &Order::Open).unwrap();
         }
-        book.obey(&lab(), &admit(KEY)).unwrap();
-        assert_eq!(book.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
+        tenant_registry.obey(&lab(), &admit(KEY)).unwrap();
+        assert_eq!(tenant_registry.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
         // Not even after its first owner is done with it: old messages may still be on their way.
-        book.obey(&lab(), &Order::Retire { key: KEY, overlap_seconds: 0 }).unwrap();
-        assert_eq!(book.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
+        tenant_registry.obey(&lab(), &Order::Retire { key: KEY, overlap_seconds: 0 }).unwrap();
+        assert_eq!(tenant_registry.obey(&other, &admit(KEY)), Err(OrderError::KeyOfOther));
     }
 }

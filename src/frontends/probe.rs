@@ -10,7 +10,7 @@ use super::client::Identity;
 
 /// What became of a handshake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Knock {
+pub(super) enum Probe {
     /// Somebody let us in.
     LetIn,
     /// We have proved to have our key, and the service does not let it in.
@@ -29,10 +29,10 @@ const MECHANISM_MISMATCH: u32 = 0x1100_0002;
 const BROKEN_OFF_MIN: usize = 2;
 
 /// Makes one handshake and tells how it went, within `patience`.
-pub(super) fn knock(endpoint: &str, identity: Option<&Identity>, patience: Duration) -> Knock {
+pub(super) fn probe(endpoint: &str, identity: Option<&Identity>, patience: Duration) -> Probe {
     // A context of its own: whatever happens on it happens to nobody else.
     let context = zmq::Context::new();
-    watch(&context, endpoint, identity, patience).unwrap_or(Knock::Silence)
+    watch(&context, endpoint, identity, patience).unwrap_or(Probe::Silence)
 }
 
 fn watch(
@@ -40,7 +40,7 @@ fn watch(
     endpoint: &str,
     identity: Option<&Identity>,
     patience: Duration,
-) -> zmq::Result<Knock> {
+) -> zmq::Result<Probe> {
     const MONITOR: &str = "inproc://knock";
     let socket = context.socket(zmq::DEALER)?;
     socket.set_linger(0)?;
@@ -67,7 +67,7 @@ fn watch(
         match monitor.poll(zmq::POLLIN, left_ms) {
             Ok(0) if Instant::now() >= end => {
                 let is_broken_off = broken_off >= BROKEN_OFF_MIN;
-                return Ok(if is_broken_off { Knock::BrokenOff } else { Knock::Silence });
+                return Ok(if is_broken_off { Probe::BrokenOff } else { Probe::Silence });
             }
             Ok(0) | Err(zmq::Error::EINTR) => continue,
             Ok(_) => {}
@@ -78,7 +78,7 @@ fn watch(
             None => {}
             // ZeroMQ connects again at once. It may break off before it has read what the other
             // side is, and find that out at the next attempt: a better answer may follow.
-            Some(Knock::BrokenOff) => broken_off += 1,
+            Some(Probe::BrokenOff) => broken_off += 1,
             Some(knock) => return Ok(knock),
         }
     }
@@ -86,15 +86,15 @@ fn watch(
 
 /// The first frame of an event: its number (16 bits) and its value (32 bits) as this machine
 /// writes them.
-fn meaning(event: &[u8]) -> Option<Knock> {
+fn meaning(event: &[u8]) -> Option<Probe> {
     let (number, value) = event.split_first_chunk::<2>()?;
     let value = u32::from_ne_bytes(*value.first_chunk::<4>()?);
     match (SocketEvent::from_raw(u16::from_ne_bytes(*number)), value) {
-        (SocketEvent::HANDSHAKE_SUCCEEDED, _) => Some(Knock::LetIn),
-        (SocketEvent::HANDSHAKE_FAILED_AUTH, _) => Some(Knock::NotAdmitted),
-        (SocketEvent::HANDSHAKE_FAILED_PROTOCOL, MECHANISM_MISMATCH) => Some(Knock::OtherDoor),
+        (SocketEvent::HANDSHAKE_SUCCEEDED, _) => Some(Probe::LetIn),
+        (SocketEvent::HANDSHAKE_FAILED_AUTH, _) => Some(Probe::NotAdmitted),
+        (SocketEvent::HANDSHAKE_FAILED_PROTOCOL, MECHANISM_MISMATCH) => Some(Probe::OtherDoor),
         (SocketEvent::HANDSHAKE_FAILED_PROTOCOL, _)
-        | (SocketEvent::HANDSHAKE_FAILED_NO_DETAIL, _) => Some(Knock::BrokenOff),
+        | (SocketEvent::HANDSHAKE_FAILED_NO_DETAIL, _) => Some(Probe::BrokenOff),
         _ => None,
     }
 }
