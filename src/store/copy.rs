@@ -67,7 +67,7 @@ fn check_there(dir: &Path) -> Result<(), OpenError> {
         Ok(false) if !["LAYOUT", "CREATING", "log"].iter().any(|name| dir.join(name).exists()) => {
             absent("it holds other files")
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => absent("nothing has that name"),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => absent("it does not exist"),
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => absent("it is a file"),
         // What else is wrong shows when it is locked.
         _ => Ok(()),

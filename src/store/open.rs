@@ -332,7 +332,7 @@ mod tests {
         assert!(copy_refused(&file).contains("it is a file"));
         let empty = tempfile::tempdir().unwrap();
         assert!(copy_refused(dir.path()).contains("it holds other files"));
-        assert!(copy_refused(&dir.path().join("no")).contains("nothing has that name"));
+        assert!(copy_refused(&dir.path().join("no")).contains("it does not exist"));
         assert!(copy_refused(empty.path()).contains("the directory is empty"));
         assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0);
     }

@@ -205,7 +205,7 @@ fn what_cannot_be_read_is_refused_in_one_sentence_and_left_alone() {
         let with = |data: &str, parts: &[&str]| {
             refused(dir, &[verb, &["--data", data]].concat(), parts);
         };
-        with(&absent, &[&absent, "nothing has that name", "name the right one"]);
+        with(&absent, &[&absent, "it does not exist", "name the right one"]);
         with(&empty, &[&empty, "is empty", "name the right one"]);
         with(&foreign, &[&foreign, "other files"]);
         with(&file, &[&file, "it is a file"]);
