@@ -566,7 +566,7 @@ impl Stand {
 
 /// Bytes of a frame from a subscriber: a topic has 32, what is said at the handshake some 300.
 const SUBSCRIPTION_BYTES_MAX: i64 = 1_024;
-/// CommitNotifications published before subscriptions are read.
+/// Notifications published before subscriptions are read.
 const HEAR_EVERY: u32 = 64;
 /// Subscriptions read before messages are sent again.
 const BURST: usize = 1_024;

@@ -140,7 +140,7 @@ fn live(store: &Store, tenant: &TenantId, user: &str) -> StreamId {
     diary.stream
 }
 
-/// The directory's labs with an open tenant_registry.
+/// The directory's labs with an open tenant registry.
 fn begun(dir: &Path, names: &[&str]) -> (Store, TenantRegistry) {
     let store = open(dir).unwrap();
     let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();

@@ -115,9 +115,9 @@ pub fn vectors() -> Vec<Vector> {
         let proof = log.proof(0, 1, Some(size));
         add(&format!("good-grown-from-{size}"), plain(&proof), Some(log.checkpoint(size)));
     }
-    add("good-no-notification", plain(&good), Some(log.checkpoint(5)));
-    let notification = Proof { record: None, ..grown.clone() };
-    add("good-notification-alone", plain(&notification), Some(log.checkpoint(2)));
+    add("good-no-growth", plain(&good), Some(log.checkpoint(5)));
+    let growth = Proof { record: None, ..grown.clone() };
+    add("good-growth-alone", plain(&growth), Some(log.checkpoint(2)));
     let small = log_of_one();
     add("good-tree-of-one", plain(&small.proof(0, 1, None)), None);
     let witness = NoteSigner::new("witness.example.net", &[9; 32]).unwrap();
@@ -183,12 +183,8 @@ pub fn vectors() -> Vec<Vector> {
         None,
     );
 
-    add("refused-notification-not-shown", plain(&good), Some(log.checkpoint(2)));
-    add(
-        "refused-notification-from-elsewhere",
-        plain(&log.proof(1, 3, Some(3))),
-        Some(log.checkpoint(2)),
-    );
+    add("refused-growth-not-shown", plain(&good), Some(log.checkpoint(2)));
+    add("refused-growth-from-elsewhere", plain(&log.proof(1, 3, Some(3))), Some(log.checkpoint(2)));
     add("refused-rolled-back", plain(&small.proof(0, 1, None)), Some(log.checkpoint(2)));
     let forked = self::log(&[3, 4, 1, 4, 2]);
     add("refused-forked", plain(&forked.proof(0, 1, Some(2))), Some(log.checkpoint(2)));
