@@ -35,7 +35,7 @@ pub struct Gateway {
     thread: Option<JoinHandle<()>>,
     feed: Option<Feed>,
     // After the gateway's thread has closed its sockets: without it handshakes fail open.
-    _doorkeeper: Option<Authenticator>,
+    _authenticator: Option<Authenticator>,
 }
 
 /// Where a gateway listens.
@@ -185,7 +185,7 @@ impl Gateway {
             outbox,
             thread: Some(thread),
             feed,
-            _doorkeeper: authenticator,
+            _authenticator: authenticator,
         })
     }
 

@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_frames_come_nobody_is_let_in_and_the_doorkeeper_stays() {
+    fn whatever_frames_come_nobody_is_let_in_and_the_authenticator_stays() {
         use proptest::prelude::*;
         let (keeper, socket, failure) = desk();
         let part = || {

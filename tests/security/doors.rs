@@ -561,7 +561,7 @@ fn a_service_that_cannot_answer_handshakes_ends_and_answers_nobody() {
         .args(["serve", "--recipe", "tiny", "--log-filter", "off", "--curve", "tcp://127.0.0.1:0"])
         .arg("--data")
         .arg(&data)
-        .env("APPRENTICE_PANIC", "doorkeeper:2")
+        .env("APPRENTICE_PANIC", "authenticator:2")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
