@@ -299,11 +299,11 @@ byte_id!(
     ///
     /// ```compile_fail,E0277
     /// let mut streams = std::collections::BTreeMap::new();
-    /// streams.insert(apprentice::ids::StreamKey::TENANT, "the last lab only");
+    /// streams.insert(apprentice_core::ids::StreamKey::TENANT, "the last lab only");
     /// ```
     ///
     /// ```compile_fail,E0277
-    /// let key = apprentice::ids::StreamKey::TENANT;
+    /// let key = apprentice_core::ids::StreamKey::TENANT;
     /// std::collections::HashMap::from([(key, "the last lab only")]);
     /// ```
     StreamKey, 16, "stream key", "32 hexadecimal digits"

@@ -9,13 +9,13 @@ use crate::limits::SCENE_OBJECTS_MAX;
 /// and evaluations all build with it.
 ///
 /// ```
-/// use apprentice::world::household::{Room, SceneBuilder};
+/// use apprentice_household::{Room, SceneBuilder};
 /// let mut builder = SceneBuilder::new(Room::Kitchen);
 /// let counter = builder.stand("CounterTop")?;
 /// let mug = builder.put("Mug", counter)?;
 /// builder.soil(mug)?.stand_at(counter);
 /// let scene = builder.build();
-/// # Ok::<(), apprentice::world::household::BuildError>(())
+/// # Ok::<(), apprentice_household::BuildError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct SceneBuilder {

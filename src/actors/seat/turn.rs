@@ -215,14 +215,15 @@ impl<D: Domain, C> Seat<D, C> {
     /// appended does the seat go on. Otherwise a new one reads what the log says.
     fn append_failed(&mut self, work: Work<C>, error: &AppendError) {
         tracing::warn!(stream = %self.stream, %error, "an append failed");
+        if error.is_fatal() {
+            // Before the answer: whoever hears it may look whether the service ends.
+            self.effects.push(Effect::Fatal(error.to_string()));
+        }
         let response = match error.retry_after_ms() {
             Some(after_ms) => Response::busy(error.to_string(), after_ms),
             None => Response::error(ErrorCode::Unavailable, error.to_string()),
         };
         self.answer(work.caller, response);
-        if error.is_fatal() {
-            self.effects.push(Effect::Fatal(error.to_string()));
-        }
         match error.is_certain() {
             // A training that could not be recorded is still due.
             true => self.ask_for_training(),
