@@ -153,6 +153,8 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
             ada.say("ring the brass bell").unwrap();
         }
     }
+    // On a busy machine some are still on their way. This one comes after them on the same connection.
+    mallory.with_patience(LONG).hello().unwrap();
     let most = 10 + 5 * (start.elapsed().as_secs() as usize + 1);
     let taken = 500 - service.usage()[&flood].refused.utterances as usize;
     assert!((10..=most).contains(&taken), "{taken} of at most {most} went through");

@@ -253,3 +253,25 @@ fn a_lesson_about_a_fixture_is_not_for_another_thing() {
     report.finish();
     assert!(acted(&talk.asks("please peek into the fridge")), "the same fixture");
 }
+
+/// What a lesson is to be done with is asked for, too: the lesson was done without it.
+#[test]
+fn a_lesson_is_not_done_without_the_tool_that_was_named() {
+    let wash = (
+        "wash the mug",
+        "PICKUP Mug; GOTO SinkBasin; PUT Mug SinkBasin; TOGGLE Faucet; TOGGLE Faucet; PICKUP Mug",
+    );
+    let talk = Talk::taught(&Setting::kitchen(), &[wash]);
+    let with: Vec<String> = ["banana", "fork", "zork", "hammer", "knife"]
+        .into_iter()
+        .flat_map(|tool| {
+            [
+                format!("wash the tomato with the {tool}"),
+                format!("wash the tomato using a {tool}"),
+                format!("please wash the potato with the {tool}"),
+            ]
+        })
+        .collect();
+    talk.is_unsure("nothing is washed without the tool", &with);
+    assert!(acted(&talk.asks("wash the tomato")), "the lesson itself");
+}

@@ -17,6 +17,9 @@ pub(super) struct Account<'a> {
 /// Words between clauses that say when.
 const ORDER: [&str; 3] = ["before", "after", "while"];
 
+/// Words before the thing that something is done with.
+pub(super) const TOOLS: [&str; 2] = ["with", "using"];
+
 /// What stands where a thing is named.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Head<'a> {
@@ -63,6 +66,7 @@ impl<'a> Account<'a> {
             taught.words.iter().any(|known| matches!(known, Word::Text(text) if text == word))
         };
         let left = self.unknown_object().into_iter().chain(self.unknown_joined());
+        let left = left.chain(self.unknown_tool());
         let left = left.chain(self.numbers()).filter(|word| !in_lesson(word));
         owned(left.chain(self.other_state(taught)))
     }
@@ -101,9 +105,9 @@ impl<'a> Account<'a> {
         self.texts().find(number).map(|(_, word)| word)
     }
 
-    /// "Open the fridge with the hammer".
+    /// "Open the fridge with the hammer", "wash it with the zork".
     fn unknown_tool(&self) -> Option<&'a str> {
-        let with = self.texts().find(|(_, word)| *word == "with")?;
+        let with = self.texts().find(|(_, word)| TOOLS.contains(word))?;
         self.unknown_at(with.0 + 1, false)
     }
 

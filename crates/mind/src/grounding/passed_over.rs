@@ -1,5 +1,6 @@
 //! Things that were named and that a reading does not use: it would pass them over, so it is not taken.
 
+use super::accounting::TOOLS;
 use super::arguments::Arguments;
 use crate::language::{Grammar, LiftedUtterance, Program, Symbol, Word};
 use crate::world::Domain;
@@ -9,7 +10,8 @@ const JOINING: [&str; 6] = ["plus", "well", "followed", "along", "together", "in
 
 impl<D: Domain> Arguments<'_, D> {
     /// The things that were named as what to act on, and that the program does not use; of a lesson
-    /// also the place where something is to be put, and what stands in the place of its fixture.
+    /// also the place where something is to be put, what stands in the place of its fixture, and
+    /// what it is to be done with.
     ///
     /// - `lesson`: its words, if the program is a lesson's.
     pub fn passed_over(&self, program: &Program, lesson: Option<&LiftedUtterance>) -> Vec<String> {
@@ -35,7 +37,8 @@ impl<D: Domain> Arguments<'_, D> {
                     _ => (instead || self.ends_put(program)) && self.is_put_there(place),
                 }
             };
-            let unused = !used && (acted_on || lesson.is_some_and(put_there));
+            let asked = |lesson| put_there(lesson) || self.is_tool_of(lesson, place);
+            let unused = !used && (acted_on || lesson.is_some_and(asked));
             if unused || (place > 0 && self.is_lit(program, place)) {
                 left.push(mention.surface.clone());
             }
@@ -60,6 +63,19 @@ impl<D: Domain> Arguments<'_, D> {
         let most = (0..counts.len()).max_by_key(|&at| counts[at]);
         let puts = most.is_some_and(|most| lexicon.roles.puts(&habits.order[most]));
         puts && self.is_place(place) && !self.is_part(place)
+    }
+
+    /// Whether something is to be done with a mention, and the lesson was done with nothing: "wash the
+    /// tomato with the FORK", after "wash the mug".
+    fn is_tool_of(&self, lesson: &LiftedUtterance, place: usize) -> bool {
+        let with = |word: &&str| TOOLS.contains(word);
+        let in_lesson = lesson.words.iter().any(|word| match word {
+            Word::Text(text) => TOOLS.contains(&text.as_str()),
+            Word::Slot { .. } => false,
+        });
+        let before = self.before(place);
+        let mut last = before.iter().rev().filter(|word| !self.lists.determiners.contains(**word));
+        place > 0 && !in_lesson && last.next().is_some_and(with)
     }
 
     /// Whether a mention stands in the place of a fixture that the lesson names and the clause does not:
