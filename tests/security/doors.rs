@@ -581,6 +581,14 @@ fn a_service_that_cannot_answer_handshakes_ends_and_answers_nobody() {
         let client = connect_to(&endpoint, &key, server).with_patience(Duration::from_secs(1));
         client.hello().unwrap_err();
     }
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while child.try_wait().unwrap().is_none() {
+        if Instant::now() > deadline {
+            child.kill().unwrap();
+            panic!("it answers no handshakes and goes on");
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
     let ended = child.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let said = String::from_utf8(ended.stderr).unwrap();
