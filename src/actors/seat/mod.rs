@@ -215,6 +215,9 @@ impl<D: Domain, C> Seat<D, C> {
     }
 
     fn sleep(&mut self) {
+        // When everybody is sent to sleep, some may still wait for a training.
+        let interrupted = "the request was interrupted; send it again";
+        self.answer_waiters_with(&Response::busy(interrupted, RETRY_LEAVING_MS));
         if self.session().is_some_and(Session::is_open) {
             self.effects.push(Effect::KeepSnapshot);
         }
@@ -229,11 +232,15 @@ impl<D: Domain, C> Seat<D, C> {
 
     /// As [`Seat::leave`], with another answer: a new seat would fare no better.
     fn leave_with(&mut self, response: Response) {
+        self.answer_waiters_with(&response);
+        self.stage = Stage::Leaving(response);
+        self.effects.push(Effect::Leave);
+    }
+
+    fn answer_waiters_with(&mut self, response: &Response) {
         for (_, caller) in std::mem::take(&mut self.waiters) {
             self.effects.push(Effect::Answer { caller, response: response.clone() });
         }
-        self.stage = Stage::Leaving(response);
-        self.effects.push(Effect::Leave);
     }
 
     /// - `caller`: none for what the service itself asked.

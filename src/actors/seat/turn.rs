@@ -205,10 +205,7 @@ impl<D: Domain, C> Seat<D, C> {
             return;
         }
         let waited = Waited { status: session.status(), told: self.last_told.clone() };
-        for (_, caller) in std::mem::take(&mut self.waiters) {
-            let response = Response::Waited(waited.clone());
-            self.effects.push(Effect::Answer { caller, response });
-        }
+        self.answer_waiters_with(&Response::Waited(waited));
     }
 
     /// The state did not change: the turn is dropped. Only when it is certain that nothing was
