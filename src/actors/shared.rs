@@ -9,9 +9,8 @@ use super::meters::Meters;
 use super::seat::NewSession;
 use super::trainer::{Run, Slot, Train, Trainer};
 use super::{CommitNotifications, ErrorCode, Failure, Registrar, Response};
-use crate::events::Record;
 use crate::fairness::Trainings;
-use crate::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
+use crate::ids::{Digest, RequestId, StreamId, TenantId, Timestamp, UserId};
 use crate::learning::{self, Lesson, Mind, Recipe};
 use crate::limits::TRAIN_QUEUE_MAX;
 use crate::replay::{self, Minds};
@@ -144,20 +143,6 @@ impl<D: Domain> Shared<D> {
 
     pub fn remember(&self, tenant: &TenantId, mind: Arc<Mind>) {
         self.common.minds.put(tenant, mind);
-    }
-
-    /// The records `first` to `last` of a stream, for answering a request again.
-    ///
-    /// - errors: a sentence, when they cannot be read.
-    pub fn records(&self, stream: &StreamId, first: Seq, last: Seq) -> Result<Vec<Record>, String> {
-        let wanted = (last.get() - first.get() + 1) as usize;
-        let records = self.log().read(stream, first).map_err(|error| error.to_string())?;
-        let records: Vec<Record> =
-            records.take(wanted).collect::<Result<_, _>>().map_err(|error| error.to_string())?;
-        match records.len() == wanted {
-            true => Ok(records),
-            false => Err(format!("records {first} to {last} of {stream} are missing")),
-        }
     }
 }
 

@@ -13,6 +13,7 @@ use super::shared::{self, Shared};
 use super::submit::{AnswerTo, Submit};
 use super::trainer::{Train, Trained};
 use crate::limits::MAILBOX_MAX;
+use crate::replay;
 use crate::store::Pending;
 use crate::world::Domain;
 
@@ -71,7 +72,8 @@ impl<D: Domain> UserActor<D> {
                 return Outcome::Pending(shared.log().append(stream, after, batch));
             }
             Effect::ReadBack { first, last } => {
-                return Outcome::Known(Input::ReadBack(shared.records(stream, first, last)));
+                let records = replay::read_back(shared.log(), stream, first, last);
+                return Outcome::Known(Input::ReadBack(records));
             }
             Effect::FindMind(digest) => {
                 return Outcome::Known(Input::Found(shared.mind(&stream.tenant, digest)));

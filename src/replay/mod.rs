@@ -20,4 +20,4 @@ pub use evidence::{
 };
 pub use minds::{Minds, Work};
 pub use origins::{keep_mind, mind_origin, state_origin};
-pub use rebuild::{RebuildError, keep_snapshot, mind_of, rebuild, rebuild_at};
+pub use rebuild::{RebuildError, keep_snapshot, mind_of, read_back, rebuild, rebuild_at};

@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
 use super::{Minds, origins};
-use crate::events::Head;
+use crate::events::{Head, Record};
 use crate::ids::{Digest, Seq, StreamId};
 use crate::learning::{self, Mind, Recipe, RecipeError};
 use crate::session::{Divergence, Session, State};
-use crate::store::{Found, ReadError, Store};
+use crate::store::{EventLog, Found, ReadError, Store};
 use crate::world::Domain;
 
 /// Why a session cannot be rebuilt.
@@ -209,4 +209,23 @@ pub fn mind_of<D: Domain>(
     let mind = Arc::new(mind);
     minds.put(&stream.tenant, mind.clone());
     Ok(mind)
+}
+
+/// The records `first` to `last` of a stream, for answering a request again.
+///
+/// - errors: a sentence, when they cannot be read or some are missing.
+pub fn read_back(
+    log: &dyn EventLog,
+    stream: &StreamId,
+    first: Seq,
+    last: Seq,
+) -> Result<Vec<Record>, String> {
+    let wanted = (last.get() - first.get() + 1) as usize;
+    let records = log.read(stream, first).map_err(|error| error.to_string())?;
+    let records: Vec<Record> =
+        records.take(wanted).collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+    match records.len() == wanted {
+        true => Ok(records),
+        false => Err(format!("records {first} to {last} of {stream} are missing")),
+    }
 }

@@ -125,8 +125,8 @@ pub enum AppendError {
 }
 
 impl AppendError {
-    /// Whether nothing was appended, so that whoever decided on the batch may go on. Otherwise only
-    /// reading the log says what is there.
+    /// Whether it is certain that nothing was appended. Then the writer may go on. Otherwise it must
+    /// read the log first.
     pub fn is_certain(&self) -> bool {
         match self {
             AppendError::Busy { .. } | AppendError::TooLarge { .. } => true,

@@ -9,11 +9,11 @@ use apprentice::actors::{
     DirectoryEffect, DirectoryInput, Effect, ErrorCode, Input, Letter, NotDelivered, OrderError,
     PersonAsk, Response, TenantRegistry, Undelivered, wall_clock,
 };
-use apprentice::events::{Head, Record};
-use apprentice::ids::{Seq, StreamId, TenantId, Timestamp};
+use apprentice::events::Head;
+use apprentice::ids::{StreamId, TenantId, Timestamp};
 use apprentice::invariants::Invariant;
 use apprentice::learning;
-use apprentice::replay::{Through, keep_mind, keep_snapshot, rebuild};
+use apprentice::replay::{Through, keep_mind, keep_snapshot, read_back, rebuild};
 use apprentice::session::{Reply, Session};
 use apprentice::store::Pending;
 
@@ -233,7 +233,8 @@ impl System {
             }
             Effect::ReadBack { first, last } => {
                 self.counts.one("repeated");
-                return Ok(Some(Input::ReadBack(self.read_back(&stream, first, last))));
+                let records = read_back(&*self.store.log, &stream, first, last);
+                return Ok(Some(Input::ReadBack(records)));
             }
             Effect::FindMind(digest) => {
                 let mind = self.processes[process].minds.get(&stream.tenant, digest);
@@ -365,17 +366,6 @@ impl System {
             }
         }
         self.seat(process, generation, Input::Appended(result))
-    }
-
-    fn read_back(&self, stream: &StreamId, first: Seq, last: Seq) -> Result<Vec<Record>, String> {
-        let wanted = (last.get() - first.get() + 1) as usize;
-        let records = self.store.log.read(stream, first).map_err(|error| error.to_string())?;
-        let records: Vec<_> =
-            records.take(wanted).collect::<Result<_, _>>().map_err(|error| error.to_string())?;
-        match records.len() == wanted {
-            true => Ok(records),
-            false => Err("records are missing".to_owned()),
-        }
     }
 
     fn leave(&mut self, process: usize, generation: u64, stream: StreamId) -> Result<(), Broken> {

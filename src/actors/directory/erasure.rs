@@ -1,5 +1,5 @@
-//! Erase a person: their seat goes to sleep for good, nobody wakes them meanwhile, and when nothing
-//! of theirs is under way any more, the registrar destroys their key.
+//! Erases a person. The directory waits until the person's requests and trainings are done, sends the
+//! seat to sleep and wakes no other. Then the registrar destroys the key.
 
 use std::time::Duration;
 

@@ -13,7 +13,7 @@ use super::presence::{Attention, Presence};
 use super::response::Response;
 use crate::ids::{StreamId, TenantId, UserId};
 
-/// Knows who is awake, wakes whoever is asked for, and is the only one who puts people to sleep: a
+/// Knows who is awake, wakes people when somebody asks for them, and alone puts people to sleep: a
 /// seat that stopped by itself while others hold its address would lose their messages.
 ///
 /// `L` is a request with its way back, `E` the way back of an erasure.
@@ -237,6 +237,9 @@ impl<L, E> Directory<L, E> {
 
     /// - errors: why nobody more can be awake.
     fn make_room(&mut self, letter: &Letter<L>) -> Result<(), NoRoom> {
+        if self.stopping {
+            return Err(NoRoom::OfAll);
+        }
         let tenant = &letter.stream.tenant;
         // At its own limit a tenant makes room among its own people, never among others'.
         let awake = self.awake_of(tenant);
@@ -312,7 +315,7 @@ impl<L, E> Directory<L, E> {
     }
 
     fn sleep_all(&mut self) {
-        (self.awake_max, self.stopping) = (0, true);
+        self.stopping = true;
         let awake: BTreeSet<(StreamId, u64)> =
             self.entries.iter().map(|(stream, it)| (stream.clone(), it.generation)).collect();
         for (stream, generation) in awake {

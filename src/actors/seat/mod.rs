@@ -26,7 +26,7 @@ pub struct NewSession {
     pub recipe: Recipe,
     /// As it is recorded.
     pub recipe_text: String,
-    /// Trained on no lesson: it holds nobody's words, so everybody shares it.
+    /// Trained on no lesson. It holds no user's words, so all users share it.
     pub base: Arc<Mind>,
 }
 
@@ -225,7 +225,7 @@ impl<D: Domain, C> Seat<D, C> {
     }
 
     /// Stops in the only way that loses no message: the directory forgets this seat, and then sends
-    /// it to sleep. Whoever asks in between is told to ask again, which wakes a new one.
+    /// it to sleep. Requests in between are answered with busy; the next one wakes a new seat.
     fn leave(&mut self) {
         self.leave_with(Response::busy("the session is read from the log again", RETRY_LEAVING_MS));
     }

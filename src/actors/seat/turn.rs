@@ -213,7 +213,7 @@ impl<D: Domain, C> Seat<D, C> {
     fn append_failed(&mut self, work: Work<C>, error: &AppendError) {
         tracing::warn!(stream = %self.stream, %error, "an append failed");
         if error.is_fatal() {
-            // Before the answer: whoever hears it may look whether the service ends.
+            // Before the answer: a caller may look at once whether the service ends.
             self.effects.push(Effect::Fatal(error.to_string()));
         }
         let response = match error.retry_after_ms() {
