@@ -26,7 +26,7 @@ fn same_minds() -> Result<(), String> {
     eprintln!("== the release build trains the same minds");
     let binary = machine::release_binary()?.display().to_string();
     let environment = [("APPRENTICE_OPTIMISED_BINARY", binary.as_str()), ("CI", "true")];
-    let test = ["test", "--test", "determinism", "processors_train_the_same_minds"];
+    let test = ["test", "--test", "determinism", "train_the_same_minds"];
     run_with(&environment, "cargo", &test)
 }
 

@@ -82,9 +82,9 @@ fn setup() -> Result<(), String> {
     Ok(())
 }
 
-/// The library's own tests, and that the map is the territory.
+/// The libraries' own tests, and that the map is the territory.
 fn unit() -> Result<(), String> {
-    run("cargo", &["test", "--quiet", "--lib", "--test", "tidy"])
+    run("cargo", &["test", "--quiet", "--workspace", "--lib", "--test", "tidy"])
 }
 
 fn build() -> Result<(), String> {
