@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::frontends::Client;
+use apprentice::client::Client;
 use apprentice::ids::UserId;
 use apprentice::learning::Recipe;
 use apprentice::service::{Config, Data, Service};

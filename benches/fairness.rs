@@ -12,12 +12,12 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, PersonAsk, Response};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, Context, CurveKey, Identity, fresh_id};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{
+    Ask, Client, Command, Context, CurveKey, Identity, PersonAsk, Response, fresh_id,
+};
 use apprentice::ids::{PublicKey, TenantId, UserId};
 use apprentice::service::{Config, Data, Service};
-use apprentice::session::Command;
 use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;

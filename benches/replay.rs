@@ -2,9 +2,6 @@
 //!
 //! The real household and the recipe `default`; the log is sled's, on the disk that `target/` is on.
 
-#[path = "../tests/support/diary.rs"]
-mod diary;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -17,7 +14,7 @@ use apprentice::replay::{Minds, Scrutiny, audit, keep_mind, rebuild_at, streams_
 use apprentice::session::{Outstanding, Session};
 use apprentice::store::{Store, open, open_memory};
 use apprentice::world::household::Household;
-use diary::Diary;
+use apprentice_testkit::diary::Diary;
 
 /// Episodes of one life.
 const EPISODES: usize = 5;

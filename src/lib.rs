@@ -4,8 +4,9 @@
 //! **State is a fold over the log. A mind is a pure function of the state.** Everything else is
 //! plumbing: [`session`] decides and applies, [`learning`] trains, [`store`] keeps, [`actors`] and
 //! [`frontends`] carry. `ARCHITECTURE.md` is the map; its two tables are checked by
-//! `tests/tidy.rs`. Rooms below stand in storeys: imports point upwards on this list only.
+//! `tests/tidy/`. Rooms below stand in storeys: imports point upwards on this list only.
 
+pub use apprentice_client as client;
 pub use apprentice_core::{fairness, ids, invariants, language, limits, numerics, plain, sabotage};
 pub use apprentice_mind::{grounding, learning, parser};
 
@@ -24,7 +25,5 @@ pub mod replay;
 pub mod store;
 
 pub mod actors;
-pub mod cli;
 pub mod frontends;
 pub mod service;
-pub mod study;

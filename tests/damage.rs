@@ -2,10 +2,6 @@
 //! recorded, or somebody is told. `APPRENTICE_FLIPS` and `APPRENTICE_SEED` give another
 //! number and repeat a run.
 
-mod support {
-    pub mod chance;
-}
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +15,7 @@ use apprentice::events::{Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId, UserId};
 use apprentice::store::conformance::{batch, stream};
 use apprentice::store::{Found, OpenError, Origin, SeededEntropy, open};
-use support::chance::{below, number, seed};
+use apprentice_testkit::chance::{below, number, seed};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
 const FLIPS: u64 = 2_000;

@@ -11,15 +11,15 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
+use apprentice::client::OnClash;
 use apprentice::ids::{Digest, StreamId, TenantId, UserId};
 use apprentice::learning::{Mind, Recipe, pinned, train};
 use apprentice::numerics::Kernel;
 use apprentice::replay::{Minds, rebuild};
 use apprentice::service::{Config, Data, Service};
-use apprentice::session::OnClash;
 use apprentice::store;
-use apprentice::study::known_minds::{histories, lessons, stage, train_all};
 use apprentice::world::household::Household;
+use apprentice_study::known_minds::{histories, lessons, stage, train_all};
 
 const RECIPES: [&str; 6] = Recipe::BUILTIN;
 /// One of each kind of parser; the halves of the last are in it.

@@ -1,11 +1,6 @@
 //! Fifty thousand records of one person: waking, looking back and auditing hold a few of them in
 //! memory, never all.
 
-mod support {
-    pub mod diary;
-    pub mod toy;
-}
-
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -17,8 +12,8 @@ use apprentice::replay::{
 };
 use apprentice::session::Command;
 use apprentice::store::open_memory;
-use support::diary::Diary;
-use support::toy::Bells;
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::toy::Bells;
 
 const RECORDS: u64 = 50_000;
 /// Utterances of one episode.

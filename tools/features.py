@@ -1109,7 +1109,7 @@ def numbers(values):
 def write(model):
     habits = model.judge.habits
     lines = ["# In how many clauses, of those that meant each primitive, a word stood. `V:` marks a clause's main verb, `_` its",
-             "# particle, `n:` the number of things named. Written by tools/features.py from recorded sentences (data/NOTICE).",
+             "# particle, `n:` the number of things named. Written by tools/features.py from recorded sentences (NOTICE).",
              "", "order = " + json.dumps(PRIMITIVES), "clauses = " + numbers([habits.clauses[p] for p in PRIMITIVES]), "", "[words]"]
     lines += [f"{json.dumps(word)} = {numbers(row)}" for word, row in sorted(habits.counts.items())]
     (ROOT / "crates/household/data/habits.toml").write_text("\n".join(lines) + "\n")

@@ -272,7 +272,7 @@ def main(shared, out):
 
 def head(what):
     return (f"# {what}\n# Written by tools/household_facts.py from ALFRED json_2.1.0 facts"
-            " (data/NOTICE); change the tool, not this file.\n")
+            " (NOTICE); change the tool, not this file.\n")
 
 
 def quoted(items):

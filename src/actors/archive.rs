@@ -3,137 +3,20 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::Value;
-
+use super::AnswerTo;
 use super::awake::Awake;
-use super::{AnswerTo, ErrorCode, Response};
-use crate::events::{Header, Record};
+use crate::client::{
+    ArchiveAsk, ErrorCode, Frame, HeadView, Heads, PlainRecords, PlainView, Response,
+    SealedRecords, SealedView,
+};
+use crate::events::Record;
 use crate::fairness::{Room, Turns};
-use crate::ids::{Digest, Seq, StreamId, StreamKey, TenantId, Timestamp};
+use crate::ids::{Seq, StreamId, StreamKey, TenantId};
 use crate::limits::{
     ARCHIVE_QUEUE_MAX, HEADS_IN_REPLY_MAX, RECORDS_IN_REPLY_BYTES, RECORDS_IN_REPLY_MAX,
 };
 use crate::replay;
 use crate::store::{EventLog, ReadError};
-
-/// A question about what a tenant's log holds. Whose log: that of whoever asks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ArchiveAsk {
-    /// Where the streams end, those after `after` in the order of their keys.
-    Heads { after: Option<StreamKey>, limit: u32 },
-    /// Records as they are kept.
-    Sealed { stream: StreamKey, from: Seq, limit: u32 },
-    /// Records opened.
-    Plain { stream: StreamKey, from: Seq, limit: u32 },
-}
-
-/// Where a stream ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HeadView {
-    pub stream: StreamKey,
-    pub seq: Seq,
-    pub digest: Digest,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Heads {
-    pub heads: Vec<HeadView>,
-    /// There are more streams after the last of these.
-    pub more: bool,
-}
-
-/// A record as it is kept.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SealedView {
-    pub stream: StreamKey,
-    pub seq: Seq,
-    pub digest: Digest,
-    pub frame: Frame,
-}
-
-/// Header and sealed body of a record: what its digest is over.
-#[derive(Clone, PartialEq, Eq)]
-pub struct Frame(pub Vec<u8>);
-
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SealedRecords {
-    pub records: Vec<SealedView>,
-    /// There are more records after the last of these.
-    pub more: bool,
-}
-
-/// A record in the clear.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PlainView {
-    pub stream: StreamKey,
-    pub seq: Seq,
-    pub at: Timestamp,
-    pub prev: Digest,
-    pub digest: Digest,
-    pub kind: String,
-    pub event: Value,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PlainRecords {
-    /// The person was erased: nobody can open these records any more.
-    pub erased: bool,
-    pub records: Vec<PlainView>,
-    pub more: bool,
-}
-
-impl SealedView {
-    /// Holds the record against its digest and its predecessor's, without a key.
-    ///
-    /// - errors: a sentence; the record is then not what it says it is.
-    pub fn check(&self, prev: Digest) -> Result<(), String> {
-        let SealedView { stream, seq, digest, frame } = self;
-        let wrong = |what: &str| Err(format!("record {seq} of stream {stream}: {what}"));
-        let (header, _, found) = match Header::unframe(&frame.0) {
-            Ok(read) => read,
-            Err(error) => return wrong(&error.to_string()),
-        };
-        if found != *digest {
-            return wrong("its bytes have another digest");
-        }
-        if header.stream != *stream || header.seq != *seq {
-            return wrong("its header is another record's");
-        }
-        match header.prev == prev {
-            true => Ok(()),
-            false => wrong("it follows on another record"),
-        }
-    }
-}
-
-impl Serialize for Frame {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_bytes(&self.0)
-    }
-}
-
-impl<'de> Deserialize<'de> for Frame {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Frame, D::Error> {
-        struct Visitor;
-        impl serde::de::Visitor<'_> for Visitor {
-            type Value = Frame;
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("bytes")
-            }
-            fn visit_bytes<E: serde::de::Error>(self, bytes: &[u8]) -> Result<Frame, E> {
-                Ok(Frame(bytes.to_vec()))
-            }
-        }
-        deserializer.deserialize_bytes(Visitor)
-    }
-}
-
-impl std::fmt::Debug for Frame {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Frame({} bytes)", self.0.len())
-    }
-}
 
 /// Reads what is durable. Blocks.
 #[derive(Clone)]

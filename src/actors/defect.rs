@@ -1,6 +1,6 @@
 use std::any::Any;
 
-use super::{ErrorCode, Response};
+use crate::client::{ErrorCode, Response};
 
 /// The answer to a request that met a panic. Says so to the operator, too.
 pub(super) fn defect(doing: &str, panic: &(dyn Any + Send)) -> Response {

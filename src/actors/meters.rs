@@ -3,14 +3,14 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
 
-use super::operator::{TenantAsk, TenantVerb};
-use super::response::{Ask, PersonAsk, Quota, QuotaExceeded, Response};
+use crate::client::{
+    Ask, Command, Order, PersonAsk, Quota, QuotaExceeded, Response, TenantAsk, TenantVerb,
+};
 use crate::fairness::{Bucket, Room, TOKEN};
 use crate::ids::TenantId;
 use crate::limits::GATEWAY_IN_FLIGHT_MAX;
-use crate::session::Command;
 use crate::store::EventLog;
-use crate::tenancy::{Admissions, Order, Quotas};
+use crate::tenancy::{Admissions, Quotas};
 
 /// What each tenant takes of what all share, held against what it may. Requests are measured where
 /// they come in: who is over a limit hears so at once, from the gateway's thread, and costs the
@@ -276,10 +276,11 @@ fn over(quota: Quota, used: u64, limit: u64, retry_after_ms: Option<u32>) -> Quo
 
 #[cfg(test)]
 mod tests {
-    use super::super::{DoorAsk, wall_clock};
+    use super::super::wall_clock;
     use super::*;
+    use crate::client::DoorAsk;
+    use crate::client::Query;
     use crate::ids::{PublicKey, StreamId, UserId};
-    use crate::session::Query;
     use crate::store::conformance::{batch, stream};
     use crate::store::{Store, open_memory};
     use crate::tenancy::{Registry, Role, Standing};

@@ -12,7 +12,6 @@ mod notifications;
 mod operator;
 mod presence;
 mod registrar;
-mod response;
 mod seat;
 mod shared;
 mod submit;
@@ -21,9 +20,7 @@ mod tenant_registry;
 mod trainer;
 mod user;
 
-pub use archive::{
-    ArchiveAsk, Frame, HeadView, Heads, PlainRecords, PlainView, Reader, SealedRecords, SealedView,
-};
+pub use archive::Reader;
 pub use clock::wall_clock;
 pub use directory::{
     Directory, DirectoryEffect, DirectoryInput, Letter, NotDelivered, Undelivered,
@@ -31,13 +28,9 @@ pub use directory::{
 pub use failure::{Alarm, Failure};
 pub use meters::{Refusals, Usage};
 pub use notifications::{CommitNotification, CommitNotifications};
-pub use operator::{ErasedView, KeyView, Ordered, TenantAsk, TenantVerb, TenantView};
+pub use operator::list_tenants;
 pub use presence::{Attention, Presence};
 pub use registrar::{Erased, Obeyed, Registrar, Signed};
-pub use response::{
-    Ask, Busy, DoorAsk, ErrorCode, Failed, FeedView, Hello, PersonAsk, Quota, QuotaExceeded,
-    Rejected, Response, Waited,
-};
 pub use seat::{Effect, Input, NewSession, Seat, Timer};
 pub use submit::{AnswerTo, Submit};
 pub use system::{ActorSettings, ActorSystem, ActorsError, Front, NotTaken, Wakings};

@@ -29,8 +29,9 @@ impl Drop for Attention {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AnswerTo, Response};
+    use super::super::AnswerTo;
     use super::*;
+    use crate::client::Response;
 
     #[test]
     fn a_person_is_idle_when_every_answer_is_out() {

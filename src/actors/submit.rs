@@ -4,7 +4,7 @@ use actix::Message;
 
 use super::meters::InFlight;
 use super::presence::Attention;
-use super::{PersonAsk, Response};
+use crate::client::{PersonAsk, Response};
 use crate::ids::{RequestId, TenantId, UserId};
 
 /// One request on its way to the actor of its person.

@@ -19,9 +19,9 @@ use super::shared::{Common, Shared};
 use super::trainer::Trainer;
 use super::user::UserActor;
 use super::{
-    AnswerTo, ArchiveAsk, Ask, CommitNotifications, Erased, Failure, Hello, OrderError, Registrar,
-    Response, Submit, TenantRegistry,
+    AnswerTo, CommitNotifications, Erased, Failure, OrderError, Registrar, Submit, TenantRegistry,
 };
+use crate::client::{ArchiveAsk, Ask, Hello, Response};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::replay::{Minds, Work};

@@ -7,11 +7,11 @@ use actix::{
 };
 
 use super::directory::actor::{Leaving, Sleep, Waking};
-use super::response::{ErrorCode, Response};
 use super::seat::{Effect, Input, Seat};
 use super::shared::{self, Shared};
 use super::submit::{AnswerTo, Submit};
 use super::trainer::{Train, Trained};
+use crate::client::{ErrorCode, Response};
 use crate::limits::MAILBOX_MAX;
 use crate::replay;
 use crate::store::Pending;

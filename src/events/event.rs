@@ -1,5 +1,4 @@
-use std::collections::BTreeMap;
-
+use apprentice_core::outcomes::{Ending, Report};
 use serde::{Deserialize, Serialize};
 
 use super::TenantEvent;
@@ -90,14 +89,6 @@ pub struct Interpreted {
     pub mind: Digest,
 }
 
-/// How an episode came to its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ending {
-    Achieved,
-    Abandoned,
-}
-
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeEnded {
     pub ending: Ending,
@@ -149,16 +140,6 @@ pub struct LessonForgotten {
 pub struct RetrainScheduled {
     pub recipe: Digest,
     pub lessons: Vec<Seq>,
-}
-
-/// What a training measured about itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-pub struct Report {
-    /// Seeds and live lessons.
-    pub exemplars: u32,
-    pub threshold: f32,
-    /// Everything else the parser kind reports, by name.
-    pub figures: BTreeMap<String, f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

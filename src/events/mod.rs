@@ -7,15 +7,19 @@ mod record;
 mod tenant;
 mod upcast;
 
+pub use apprentice_core::header::{Header, HeaderError, commitment};
+pub use apprentice_core::outcomes::{Ending, Report};
+pub use apprentice_core::tenants::{PersonErased, Quotas, Role};
+
 pub use codec::{DecodeError, decode, encode};
 pub use event::{
-    DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
-    EventKind, Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed,
-    RetrainScheduled, SessionClosed, SessionOpened,
+    DecompositionDeclined, DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, EventKind,
+    Interpreted, LessonForgotten, RetrainCompleted, RetrainFailed, RetrainScheduled, SessionClosed,
+    SessionOpened,
 };
 pub use receipt::Durable;
-pub use record::{Batch, Head, Header, HeaderError, Record, Times, commitment};
+pub use record::{Batch, Head, Record, Times};
 pub use tenant::{
-    KeyAdmitted, KeyRetired, Overlap, PersonErased, Quotas, QuotasSet, Role, SegmentClosed,
-    TenantDisabled, TenantEnabled, TenantEvent, TenantOpened,
+    KeyAdmitted, KeyRetired, Overlap, QuotasSet, SegmentClosed, TenantDisabled, TenantEnabled,
+    TenantEvent, TenantOpened,
 };

@@ -9,7 +9,7 @@ pub struct Durable {
 }
 
 impl Durable {
-    /// For `store/` only, after the records were made durable; `tests/tidy.rs` checks that nothing
+    /// For `store/` only, after the records were made durable; `tests/tidy/` checks that nothing
     /// else calls it.
     pub(crate) fn mint(records: Vec<Record>, head: Head) -> Durable {
         Durable { records, head }

@@ -2,7 +2,8 @@ use super::passes::Passes;
 use super::raw::Outlet;
 use super::rights::Caller;
 use super::zap::{DOMAIN, Seal};
-use super::{Context, CurveKey, Endpoint, GatewayError, lock};
+use super::{GatewayError, lock};
+use crate::client::{Context, CurveKey, Endpoint};
 use crate::ids::PublicKey;
 use crate::limits::{FRAME_BYTES_MAX, FRAMES_MAX, UNREAD_MAX};
 use crate::tenancy::Admissions;
@@ -163,9 +164,9 @@ const GIVEN_ID_BYTES: usize = 5;
 
 #[cfg(test)]
 mod tests {
-    use super::super::client::Identity;
     use super::*;
     use crate::actors::wall_clock;
+    use crate::client::Identity;
 
     fn receive(door: &Door) -> Incoming {
         assert_eq!(door.socket.poll(zmq::POLLIN, 10_000).unwrap(), 1, "a message within 10 s");

@@ -8,16 +8,17 @@ use super::counters::{Counters, count};
 use super::door::{Door, Incoming, Keyed, Sender};
 use super::erasures::{Asked, Erasures};
 use super::feed::{Feed, FeedDoor, Views, Watch};
+use super::lock;
 use super::outbox::{Inbox, Outbox};
 use super::passes::Passes;
 use super::rights::{self, Caller};
 use super::unsent::{Parcel, Place, Unsent};
-use super::wire::{self, Refused};
 use super::zap::{Authenticator, Seal};
-use super::{Context, CurveKey, Endpoint, lock};
-use crate::actors::{
-    AnswerTo, Ask, DoorAsk, ErasedView, ErrorCode, Failed, Failure, Front, NotTaken, Ordered,
-    Registrar, Response, Submit, TenantAsk, TenantVerb, TenantView,
+use crate::actors::{AnswerTo, Failure, Front, NotTaken, Registrar, Submit, list_tenants};
+use crate::client::wire::{self, Refused};
+use crate::client::{
+    Ask, Context, CurveKey, DoorAsk, Endpoint, ErasedView, ErrorCode, Failed, Ordered, Response,
+    TenantAsk, TenantVerb,
 };
 use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::{IN_HAND_BYTES_MAX, UNSENT_BYTES_MAX, UNSENT_CONNECTION_BYTES_MAX};
@@ -65,7 +66,7 @@ pub enum GatewayError {
     Bind { endpoint: String, reason: String },
     #[error(
         "this build of ZeroMQ has no CURVE, so nobody could tell who is knocking; {}",
-        lock::MEND
+        crate::client::REBUILD_WITH_CURVE
     )]
     NoCurve,
     #[error("the gateway did not start: {reason}")]
@@ -479,7 +480,7 @@ impl EventLoop {
         match verb {
             TenantVerb::List => {
                 let only = if caller.is_host() { tenant } else { Some(caller.tenant()) };
-                let tenants = TenantView::list(self.registrar.admissions(), only.as_ref());
+                let tenants = list_tenants(self.registrar.admissions(), only.as_ref());
                 answer.send(Response::Tenants(tenants));
             }
             TenantVerb::Erase { user } => {
@@ -487,7 +488,7 @@ impl EventLoop {
             }
             TenantVerb::Give(order) => {
                 let tenant = tenant.unwrap_or_else(|| caller.tenant());
-                self.registrar.order(tenant.clone(), order, move |obeyed| {
+                self.registrar.order(tenant.clone(), order.into(), move |obeyed| {
                     answer.send(match obeyed {
                         Ok(events) => {
                             Response::Ordered(Ordered { tenant, recorded: events.len() as u32 })

@@ -1,10 +1,7 @@
 //! The lock of a door with keys: ZeroMQ's CURVE (RFC 26).
 
-use super::{CurveKey, GatewayError};
-
-/// What to do about a ZeroMQ without CURVE.
-pub(super) const MEND: &str = "build apprentice inside its own workspace, where Cargo.toml replaces \
-     zeromq-src by deploy/libzmq, or listen on tcp://127.0.0.1:PORT only";
+use super::GatewayError;
+use crate::client::CurveKey;
 
 /// Milliseconds that a handshake may take; then the connection is closed.
 const HANDSHAKE_MS: i32 = 10_000;

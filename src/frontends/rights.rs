@@ -1,10 +1,10 @@
 //! Who may ask what. The table stands in `schema/wire.md` too.
 
-use crate::actors::{
-    ArchiveAsk, Ask, DoorAsk, ErrorCode, Failed, PersonAsk, TenantAsk, TenantVerb,
+use crate::client::{
+    ArchiveAsk, Ask, DoorAsk, ErrorCode, Failed, Order, PersonAsk, TenantAsk, TenantVerb,
 };
 use crate::ids::TenantId;
-use crate::tenancy::{Admitted, Order, Role};
+use crate::tenancy::{Admitted, Role};
 
 /// Who a message is from, as its door vouches: nothing in the message has a say in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -115,8 +115,9 @@ fn roles_for(ask: &Ask) -> &'static [Role] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::client::Command;
+    use crate::client::Query;
     use crate::ids::{PublicKey, Seq, StreamKey, UserId};
-    use crate::session::{Command, Query};
     use crate::tenancy::Quotas;
 
     #[test]
@@ -171,7 +172,7 @@ mod tests {
             TenantVerb::Give(Order::Rotate { old: key, new: key, overlap_seconds: 0 }),
         ];
         let hosts = [
-            TenantVerb::Give(Order::Open),
+            TenantVerb::Give(Order::Add),
             TenantVerb::Give(Order::Disable { reason: String::new() }),
             TenantVerb::Give(Order::Enable),
             TenantVerb::Give(Order::SetQuotas(Quotas::default())),

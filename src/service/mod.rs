@@ -11,10 +11,10 @@ use crate::actors::{
     ActorSettings, ActorSystem, ActorsError, Erased, Failure, OrderError, Registrar, Usage,
     Wakings, wall_clock,
 };
-use crate::frontends::{
-    Client, ClientError, Context, Counts, CurveKey, CurveKeyError, Doors, Endpoint, EndpointError,
-    FeedDoor, Gateway, GatewayError, LockedDoor,
+use crate::client::{
+    Client, ClientError, Context, CurveKey, CurveKeyError, Endpoint, EndpointError,
 };
+use crate::frontends::{Counts, Doors, FeedDoor, Gateway, GatewayError, LockedDoor};
 use crate::ids::{PublicKey, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::limits::{AWAKE_USERS_MAX, FEED_WAITING_MAX};

@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
-use super::Phase;
 use super::state::{Action, Episode, LiveLesson, Opened, State, Training, Unexplained};
+use crate::client::Phase;
 use crate::events::{
     DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, Head, Interpreted, Record,
     RetrainCompleted, SessionOpened,

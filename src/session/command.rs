@@ -1,6 +1,5 @@
-use serde::{Deserialize, Serialize};
-
 use super::Rejection;
+use crate::client::{self, OnClash};
 use crate::events::Report;
 use crate::ids::{Digest, Seq, UserId};
 use crate::language::UtteranceError;
@@ -10,8 +9,7 @@ use crate::world::Stage;
 
 /// A wish that may be refused. What people send is `StartEpisode` to `Close`; `Open` and
 /// `FinishRetrain` come from inside the service.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Command {
     /// Begin the stream. The recipe's text decides everything that the base mind was trained with.
     Open {
@@ -32,7 +30,6 @@ pub enum Command {
     Teach {
         explains: Seq,
         actions: Vec<u32>,
-        #[serde(default)]
         on_clash: OnClash,
     },
     /// No more teaching: train on what was taught.
@@ -50,31 +47,6 @@ pub enum Command {
         recipe: Digest,
         outcome: Result<(Digest, Report), String>,
     },
-}
-
-/// What to do when a new lesson has the lifted form of an old one and another program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum OnClash {
-    /// Refuse with `Rejection::Clash`, which names the old lesson; nothing is recorded.
-    #[default]
-    Ask,
-    /// Forget the old lesson and learn the new one, in one batch.
-    Replace,
-    /// Keep both and let the scene decide.
-    Keep,
-}
-
-/// A question that changes nothing and is never recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Query {
-    /// What the robot sees and holds.
-    Look,
-    /// The exemplars that answers come from.
-    Known,
-    /// Phase, goal, progress, actions so far and what may be taught.
-    Status,
 }
 
 impl Command {
@@ -123,6 +95,22 @@ impl Command {
             Command::Forget { .. } => "forget",
             Command::Close { .. } => "close",
             Command::FinishRetrain { .. } => "finish retraining",
+        }
+    }
+}
+
+impl From<client::Command> for Command {
+    fn from(command: client::Command) -> Command {
+        match command {
+            client::Command::StartEpisode { stage } => Command::StartEpisode { stage },
+            client::Command::Say { utterance } => Command::Say { utterance },
+            client::Command::Done => Command::Done,
+            client::Command::Teach { explains, actions, on_clash } => {
+                Command::Teach { explains, actions, on_clash }
+            }
+            client::Command::FinishTeaching => Command::FinishTeaching,
+            client::Command::Forget { lesson } => Command::Forget { lesson },
+            client::Command::Close { reason } => Command::Close { reason },
         }
     }
 }

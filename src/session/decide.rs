@@ -3,7 +3,8 @@
 
 use super::apply::apply_event;
 use super::state::{Episode, State, Unexplained};
-use super::{Command, Divergence, OnClash, Phase, Rejection, Session};
+use super::{Command, Divergence, Rejection, Session};
+use crate::client::{OnClash, Phase};
 use crate::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
     Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed, RetrainScheduled,

@@ -13,11 +13,14 @@ mod views;
 
 use std::sync::Arc;
 
+pub use crate::client::{
+    ActionView, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status, Teachable, Told,
+};
 pub use apply::Divergence;
-pub use command::{Command, OnClash, Query};
-pub use rejection::{Rejection, RejectionCode};
+pub use command::Command;
+pub use rejection::Rejection;
 pub use repeat::command_of;
-pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told, reply_of};
+pub use reply::reply_of;
 pub use state::{LiveLesson, State};
 
 use self::decide::Refusal;

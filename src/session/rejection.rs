@@ -1,13 +1,11 @@
-use serde::{Deserialize, Serialize};
-
-use super::Phase;
+use crate::client::{Phase, Rejected, RejectionCode, Response};
 use crate::ids::{RequestId, Seq};
 use crate::language::{LiftedProgram, LiftedUtterance, UtteranceError};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
     UTTERANCE_BYTES_MAX,
 };
-use crate::plain::Hidden;
+use crate::plain::{self, Hidden};
 use crate::world::StageError;
 
 /// Why a command was declined. Normal; nothing was recorded. The text is for the person who asked.
@@ -75,25 +73,6 @@ pub enum Rejection {
     RequestIdReused { request: RequestId, used_for: &'static str, first: Seq },
 }
 
-/// What a program may branch on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RejectionCode {
-    BadUtterance,
-    BadStage,
-    /// A free text that is neither an utterance nor of a stage: the reason of `close`.
-    BadText,
-    WrongPhase,
-    StillLearning,
-    Closed,
-    BadTeach,
-    Clash,
-    NoSuchLesson,
-    LimitReached,
-    RequestIdReused,
-    Internal,
-}
-
 impl Rejection {
     pub fn code(&self) -> RejectionCode {
         match self {
@@ -154,5 +133,13 @@ fn clash_way_out(lesson: Option<Seq>) -> &'static str {
     match lesson {
         Some(_) => "replace it, keep both, or cancel",
         None => "this cannot be changed, so teach other words",
+    }
+}
+
+impl From<Rejection> for Response {
+    fn from(rejection: Rejection) -> Response {
+        // It may quote what the person sent.
+        let message = plain::escape(&rejection.to_string()).into_owned();
+        Response::Rejected(Rejected { code: rejection.code(), message })
     }
 }

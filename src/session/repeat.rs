@@ -4,7 +4,8 @@
 //! it led to: that needs nothing beside the log, and holds for records of every version.
 
 use super::decide;
-use super::{Command, OnClash, Rejection, Reply, Session, reply_of};
+use super::{Command, Rejection, Session, reply_of};
+use crate::client::{OnClash, Reply};
 use crate::events::{Ending, EpisodeStarted, Event, Record};
 use crate::language::{Document, Utterance};
 use crate::world::{Domain, Stage};

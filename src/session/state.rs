@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::Phase;
+use crate::client::Phase;
 use crate::events::Head;
 use crate::ids::{Digest, RequestId, Seq, Timestamp, UserId};
 use crate::language::{Step, Symbol, Utterance};

@@ -1,7 +1,8 @@
 //! Questions that change nothing and are never recorded.
 
+use super::Session;
 use super::state::Episode;
-use super::{ActionView, KnownExemplar, Session, Status, Teachable};
+use crate::client::{ActionView, KnownExemplar, Status, Teachable};
 use crate::ids::Digest;
 use crate::learning::{Mind, Recipe};
 use crate::world::{Domain, View};

@@ -1,3 +1,4 @@
+use crate::client;
 use crate::events::{Quotas, Role, SegmentClosed};
 use crate::ids::{Digest, PublicKey, Seq, Signature, StreamKey, TenantId};
 
@@ -37,6 +38,24 @@ pub enum Order {
     },
     /// Seals a stretch of a person's stream. From inside the service alone.
     CloseSegment(SegmentClosed),
+}
+
+impl From<client::Order> for Order {
+    fn from(order: client::Order) -> Order {
+        match order {
+            client::Order::Add => Order::Open,
+            client::Order::Admit { key, role, label } => Order::Admit { key, role, label },
+            client::Order::Retire { key, overlap_seconds } => {
+                Order::Retire { key, overlap_seconds }
+            }
+            client::Order::Rotate { old, new, overlap_seconds } => {
+                Order::Rotate { old, new, overlap_seconds }
+            }
+            client::Order::Disable { reason } => Order::Disable { reason },
+            client::Order::Enable => Order::Enable,
+            client::Order::SetQuotas(quotas) => Order::SetQuotas(quotas),
+        }
+    }
 }
 
 /// What the tenant's key signs when a person is erased.

@@ -7,11 +7,10 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use apprentice::actors::ErrorCode;
+use apprentice::client::{Client, ClientError, Command, ErrorCode, fresh_id};
 use apprentice::events::EventKind;
-use apprentice::frontends::{Client, ClientError, fresh_id};
 use apprentice::ids::{Seq, TenantId, UserId};
-use apprentice::session::{self, Command};
+use apprentice::session::{self};
 use apprentice::store::{self, FaultPlan};
 use apprentice::world::Stage;
 
@@ -139,7 +138,7 @@ fn on_a_bad_day_everybody_is_answered_and_nothing_is_there_twice() {
 
 #[test]
 fn the_plan_that_ships_is_one() {
-    let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/drills/bad-day.toml");
+    let plan = apprentice_testkit::paths::root().join("deploy/drills/bad-day.toml");
     assert!(FaultPlan::read(&plan).unwrap().crashes_after > 0);
 }
 

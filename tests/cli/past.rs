@@ -8,15 +8,15 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use crate::support::diary::Diary;
-use crate::support::ran::run;
-use crate::support::released::released;
 use apprentice::events::Event;
 use apprentice::ids::{Digest, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::replay::{Minds, rebuild};
 use apprentice::store;
 use apprentice::world::household::Household;
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::ran::run;
+use apprentice_testkit::released::released;
 
 /// Runs and insists on code 0 and silence on standard error.
 #[track_caller]

@@ -7,12 +7,12 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::support::chance::seed;
-use crate::support::released::released;
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Seq, StreamId};
 use apprentice::store::conformance::{batch, stream};
 use apprentice::store::{self, Entropy, OpenError, SeededEntropy, Store};
+use apprentice_testkit::chance::seed;
+use apprentice_testkit::released::released;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
 const KILLS: u32 = 25;

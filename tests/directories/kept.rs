@@ -6,12 +6,12 @@
 use std::fs;
 use std::sync::Arc;
 
-use crate::support::ran::run;
-use crate::support::released::{golden, released};
 use apprentice::ids::{Digest, StreamId, TenantId, UserId};
 use apprentice::replay::{Minds, rebuild};
 use apprentice::store::{Store, open};
 use apprentice::world::household::Household;
+use apprentice_testkit::ran::run;
+use apprentice_testkit::released::{golden, released};
 
 const RELEASE: &str = "released-0.2";
 

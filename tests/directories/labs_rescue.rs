@@ -7,10 +7,6 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::Arc;
 
-use crate::support::chance::{below, number, seed};
-use crate::support::diary::Diary;
-use crate::support::toy::{self, Bells};
-use crate::support::tree::copy_tree;
 use apprentice::actors::TenantRegistry;
 use apprentice::events::{Head, Quotas, Role};
 use apprentice::ids::{PublicKey, Seq, StreamId, StreamKey, TenantId};
@@ -20,6 +16,10 @@ use apprentice::service::{Data, Service};
 use apprentice::store::conformance::{batch, stream};
 use apprentice::store::{self, ExportError, SeededEntropy, Share, Store, open};
 use apprentice::tenancy::Order;
+use apprentice_testkit::chance::{below, number, seed};
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::toy::{self, Bells};
+use apprentice_testkit::tree::copy_tree;
 
 /// Every stream's framed records, sealed as they stand.
 type Everything = BTreeMap<StreamId, Vec<Vec<u8>>>;

@@ -8,18 +8,18 @@ use std::process::{Child, Command, Output};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::support::chance::{below, seed};
-use crate::support::toy::{self, Bells};
-use crate::support::tree::copy_tree;
+use apprentice::client::{OnClash, Told};
 use apprentice::events::{Head, Record};
 use apprentice::ids::{Seq, StreamId, TenantId, UserId};
 use apprentice::language::Outcome;
 use apprentice::replay::{Minds, rebuild};
 use apprentice::service::{Data, Service};
-use apprentice::session::{OnClash, Told};
 use apprentice::store::conformance::{batch, read_all, stream};
 use apprentice::store::{self, AppendError, ImportError, SeededEntropy, Store, open};
 use apprentice::world::Stage;
+use apprentice_testkit::chance::{below, seed};
+use apprentice_testkit::toy::{self, Bells};
+use apprentice_testkit::tree::copy_tree;
 
 fn dice() -> SeededEntropy {
     SeededEntropy::new(seed())

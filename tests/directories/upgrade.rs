@@ -9,15 +9,15 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::support::released::{golden, released};
+use apprentice::client::{OnClash, Phase};
 use apprentice::events::{Event, Record};
 use apprentice::ids::{Seq, StreamId, TenantId, UserId};
 use apprentice::learning::pinned;
 use apprentice::replay::{Minds, rebuild};
 use apprentice::service::{Config, Data, Service};
-use apprentice::session::{OnClash, Phase};
 use apprentice::store::{CacheCounts, Store, copy_private, open};
 use apprentice::world::household::Household;
+use apprentice_testkit::released::{golden, released};
 
 const RELEASE: &str = "released-0.1";
 

@@ -5,17 +5,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, PersonAsk, Response};
-use apprentice::frontends::fresh_id;
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{Ask, Command, OnClash, PersonAsk, Phase, Query, Response, fresh_id};
 use apprentice::ids::{RequestId, Seq, UserId};
 use apprentice::limits::{GATEWAY_IN_FLIGHT_MAX, TRAIN_QUEUE_MAX, WAIT_S_MAX, WAITERS_MAX};
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, OnClash, Phase, Query};
 use apprentice::store::{Fault, FaultPlan};
 use apprentice::world::Stage;
 
-use crate::support::toy::{self, Bells, Gate};
+use apprentice_testkit::toy::{self, Bells, Gate};
 
 /// Some sockets that speak for many people. Each has fewer answers under way than the service keeps
 /// for a peer that does not read.

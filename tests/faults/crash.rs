@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 
 use apprentice::store::{self, Store};
 
-use crate::dice::Dice;
 use crate::ledger::{Found, Ledger};
 use crate::people::{Insisted, Person, Signals};
 use crate::served::{PATIENCE, Server, copy_tree};
+use apprentice_testkit::dice::Dice;
 
 const PEOPLE: usize = 4;
 /// Kills of one data directory; then a new one begins.

@@ -57,7 +57,7 @@ const SOON: Duration = Duration::from_millis(50);
 fn shim() -> &'static Path {
     static SHIM: OnceLock<PathBuf> = OnceLock::new();
     SHIM.get_or_init(|| {
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/shim.c");
+        let source = apprentice_testkit::paths::root().join("tests/faults/shim.c");
         let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults-shim.so");
         let compile = |compiler: &str| {
             let mut command = Command::new(compiler);

@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use apprentice::actors::Response;
+use apprentice::client::wire::encode_response;
+use apprentice::client::{Command, Reply, Response};
 use apprentice::events::{Event, Record};
-use apprentice::frontends::wire::encode_response;
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
-use apprentice::session::{Command, Reply, reply_of};
+use apprentice::session::reply_of;
 use apprentice::store::Store;
 
 /// One command and what was heard of it.

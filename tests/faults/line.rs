@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, Response};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{Ask, Response};
 use apprentice::ids::{RequestId, UserId};
 
 use crate::served::endpoint;

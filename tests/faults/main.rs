@@ -2,14 +2,6 @@
 //! inside. Promises and figures stand in `docs/reliability.md`; `cargo xtask crash` and
 //! `cargo xtask powerloss` run as many rounds as wanted.
 
-#[path = "../simulation/dice.rs"]
-mod dice;
-#[path = "../support"]
-mod support {
-    pub mod chance;
-    pub mod toy;
-}
-
 mod bounds;
 mod crash;
 mod disk;
@@ -21,7 +13,7 @@ mod people;
 mod power;
 mod served;
 
-use support::chance::{number, seed};
+use apprentice_testkit::chance::{number, seed};
 
 #[test]
 fn whenever_it_is_killed_every_acknowledgement_is_found_again() {

@@ -5,15 +5,16 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use apprentice::actors::{Ask, ErrorCode, PersonAsk, Response};
+use apprentice::client::{
+    Ask, Command, ErrorCode, OnClash, PersonAsk, Phase, Query, Response, Status,
+};
 use apprentice::ids::RequestId;
 use apprentice::limits::REQUEST_RING;
-use apprentice::session::{Command, OnClash, Phase, Query, Status};
 use apprentice::world::Stage;
 
-use crate::dice::Dice;
 use crate::ledger::{Entry, Ledger, Outcome};
 use crate::line::Line;
+use apprentice_testkit::dice::Dice;
 
 /// What the judge and the people tell each other.
 #[derive(Default)]
@@ -236,7 +237,7 @@ impl<'a> Person<'a> {
     }
 
     fn fresh(&self) -> RequestId {
-        apprentice::frontends::fresh_id()
+        apprentice::client::fresh_id()
     }
 }
 

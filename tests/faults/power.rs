@@ -14,11 +14,11 @@ use apprentice::ids::RequestId;
 use apprentice::store::{self, OpenError};
 
 use crate::crash::wait_while;
-use crate::dice::Dice;
 use crate::disk;
 use crate::ledger::Ledger;
 use crate::people::{Person, Signals};
 use crate::served::{PATIENCE, Server};
+use apprentice_testkit::dice::Dice;
 
 const PEOPLE: usize = 4;
 /// Images of one file system; then a new one begins.

@@ -31,7 +31,7 @@ pub struct Ended {
 
 /// The recipe that trains in milliseconds.
 pub fn tiny() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/mind/data/recipes/tiny.toml")
+    apprentice_testkit::paths::root().join("crates/mind/data/recipes/tiny.toml")
 }
 
 impl Server {

@@ -2,24 +2,13 @@
 //! writer wrote. Each case gets a typed error or a value, never a panic, and takes a bounded amount
 //! of memory. `cargo xtask fuzz --cases N --seed S` runs as many as wanted.
 
-#[path = "../simulation/dice.rs"]
-#[allow(dead_code)]
-mod dice;
-#[path = "../support"]
-mod support {
-    pub mod chance;
-    pub mod diary;
-    pub mod samples;
-    pub mod toy;
-}
-
 mod memory;
 mod mutate;
 mod process;
 mod socket;
 mod targets;
 
-use support::chance::{number, seed};
+use apprentice_testkit::chance::{number, seed};
 
 #[global_allocator]
 static MEMORY: memory::Counting = memory::Counting;

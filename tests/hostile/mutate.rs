@@ -1,6 +1,6 @@
 //! Makes hostile bytes from valid ones.
 
-use crate::dice::Dice;
+use apprentice_testkit::dice::Dice;
 
 /// Longest case; longer ones are cut.
 const BYTES_MAX: usize = 64 * 1024;

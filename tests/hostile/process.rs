@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use apprentice::limits::SCENE_FILE_BYTES_MAX;
 
-use crate::dice::Dice;
 use crate::memory::peak_of;
 use crate::mutate::{deepest, mutate};
 use crate::targets::{self, Target};
+use apprentice_testkit::dice::Dice;
 
 /// Stack of the threads that people's actors live on.
 const STACK: usize = 2 * 1024 * 1024;

@@ -2,19 +2,17 @@
 
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{Ask, DoorAsk, PersonAsk, Response};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, fresh_id};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{Ask, Client, Command, DoorAsk, PersonAsk, Response, fresh_id};
 use apprentice::ids::{RequestId, UserId};
 use apprentice::limits::FRAME_BYTES_MAX;
 use apprentice::service::{Data, Service};
-use apprentice::session::Command;
 use apprentice::world::Stage;
 
-use crate::dice::Dice;
 use crate::mutate::mutate;
-use crate::support::toy;
 use crate::targets;
+use apprentice_testkit::dice::Dice;
+use apprentice_testkit::toy;
 
 /// Messages before the answers to all of them are awaited.
 const WINDOW: usize = 50;

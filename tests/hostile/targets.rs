@@ -3,31 +3,32 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use apprentice::actors::{
-    ArchiveAsk, Ask, DoorAsk, Frame, HeadView, Heads, PersonAsk, PlainRecords, PlainView, Response,
-    SealedRecords, SealedView, TenantAsk, TenantVerb,
+use apprentice::client::wire::{self, Request};
+use apprentice::client::{
+    ArchiveAsk, Ask, Command, CurveKey, DoorAsk, Endpoint, FeedMessage, Frame, HeadView, Heads,
+    OnClash, Order, PersonAsk, PlainRecords, PlainView, Query, Response, SealedRecords, SealedView,
+    TenantAsk, TenantVerb, read_public,
 };
-use apprentice::cli::TranscriptFile;
 use apprentice::events::{self, EventKind, Head, Header};
 use apprentice::evidence::{
     Checkpoint, Consistency, Inclusion, NoteSigner, Proof, Revealed, TreeHash, VerifierKey,
 };
-use apprentice::frontends::wire::{self, Request};
-use apprentice::frontends::{CurveKey, Endpoint, FeedMessage, read_public};
 use apprentice::ids::{
     Digest, PublicKey, RequestId, Seq, StreamId, StreamKey, TenantId, Timestamp, UserId,
 };
 use apprentice::language::{Document, Program, Utterance};
 use apprentice::learning::{Mind, Recipe};
-use apprentice::session::{Command, OnClash, Query, State};
+use apprentice::session::State;
 use apprentice::store::{self, DataKey, FaultPlan, SeededEntropy, Store, Walk, decoders};
-use apprentice::study::corpus::Corpus;
-use apprentice::tenancy::{Order, Quotas, Role};
+use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Domain, Stage};
+use apprentice_cli::TranscriptFile;
+use apprentice_study::corpus::Corpus;
 
-use crate::support::diary::Diary;
-use crate::support::samples::samples;
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::paths::root;
+use apprentice_testkit::samples::samples;
 
 /// Says whether the bytes were read; a refusal is as good.
 pub type Decoder = dyn Fn(&[u8]) -> bool + Send + Sync;
@@ -52,10 +53,6 @@ fn target(
     }
     assert!(!corpus.is_empty(), "{name} has no example");
     Target { name, weight, corpus, read: Box::new(read) }
-}
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
 fn files(folder: &str, ending: &str) -> Vec<Vec<u8>> {
@@ -135,7 +132,7 @@ fn orders() -> Vec<Vec<u8>> {
     let (key, new) = (PublicKey([3; 32]), PublicKey([4; 32]));
     let quotas = Quotas { utterances_per_second: Some(3), ..Quotas::default() };
     let orders = [
-        Order::Open,
+        Order::Add,
         Order::Admit { key, role: Role::Auditor, label: "a laptop".to_owned() },
         Order::Retire { key, overlap_seconds: 60 },
         Order::Rotate { old: key, new, overlap_seconds: 60 },

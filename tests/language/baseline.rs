@@ -6,9 +6,9 @@ use std::sync::Arc;
 use apprentice::grounding::Moment;
 use apprentice::language::{Answerer, Exemplar, Outcome, Program, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
-use apprentice::study::known_minds::stage;
 use apprentice::world::Domain;
 use apprentice::world::household::{Household, Scene, Task};
+use apprentice_study::known_minds::stage;
 
 fn recipe(name: &str) -> Recipe {
     Recipe::parse(Recipe::builtin(name).unwrap()).unwrap()

@@ -3,18 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::support::diary::Diary;
-use crate::support::toy::config;
+use apprentice::client::{ClientError, OnClash, Phase, RejectionCode, Told};
 use apprentice::events::Event;
-use apprentice::frontends::ClientError;
 use apprentice::ids::{Digest, Seq, UserId};
 use apprentice::language::Outcome;
 use apprentice::learning::Recipe;
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, OnClash, Phase, Rejection, RejectionCode, Told};
+use apprentice::session::{Command, Rejection};
 use apprentice::store::open_memory;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::toy::config;
 
 /// Words without a meaning, and a request for the action that each is taught to stand for.
 const LESSONS: [(&str, &str); 4] = [

@@ -6,10 +6,10 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::samples::{DOCUMENTS, MEANINGS, samples};
 use apprentice::events::{Batch, Event, EventKind, Head, Header};
 use apprentice::ids::{RequestId, StreamKey, Timestamp};
 use apprentice::store::{DataKey, Draft, SeededEntropy, Walk};
+use apprentice_testkit::samples::{DOCUMENTS, MEANINGS, samples};
 use serde_json::Value;
 
 const STREAM: StreamKey = StreamKey(*b"golden stream 01");
@@ -19,7 +19,7 @@ fn key() -> DataKey {
 }
 
 fn schema() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("schema")
+    apprentice_testkit::paths::root().join("schema")
 }
 
 fn updating() -> bool {

@@ -1,14 +1,5 @@
 //! What is understood, taught, learned and recorded. Uses the library alone; see `tests/README.md`.
 
-#[path = "../support"]
-mod support {
-    pub mod chance;
-    pub mod diary;
-    pub mod recorded;
-    pub mod samples;
-    pub mod toy;
-}
-
 mod any_stage;
 mod baseline;
 mod forgetting;

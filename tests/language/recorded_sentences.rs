@@ -161,7 +161,7 @@ fn measure(mind: &Mind, cases: &[Case], show: bool) -> BTreeMap<String, Tally> {
 
 #[test]
 fn recorded_sentences_are_understood_or_honestly_declined() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let data = apprentice_testkit::paths::root().join("../shared/data");
     let path = data.join("alfred_utterances.jsonl.gz");
     if !path.exists() {
         println!("skipped: there are no recorded sentences at {}", path.display());
@@ -199,7 +199,7 @@ fn recorded_sentences_are_understood_or_honestly_declined() {
 
 #[test]
 fn many_lessons_leave_the_simple_requests_understood() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let data = apprentice_testkit::paths::root().join("../shared/data");
     let path = data.join("alfred_utterances.jsonl.gz");
     if !path.exists() {
         println!("skipped: there are no recorded sentences at {}", path.display());

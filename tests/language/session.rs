@@ -3,16 +3,15 @@
 
 use std::sync::Arc;
 
-use crate::support::toy::Bells;
+use apprentice::client::{OnClash, Phase, RejectionCode, Reply, Told};
 use apprentice::events::{Event, Record};
 use apprentice::ids::{RequestId, Seq, TenantId, Timestamp, UserId};
 use apprentice::learning::{Recipe, train};
 use apprentice::replay::{Minds, rebuild, rebuild_at};
-use apprentice::session::{
-    Command, OnClash, Outstanding, Phase, Proposed, Rejection, RejectionCode, Reply, Session, Told,
-};
+use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session};
 use apprentice::store::{Store, open_memory};
 use apprentice::world::Stage;
+use apprentice_testkit::toy::Bells;
 
 /// One person with a session and a log, driven by hand.
 struct Person {

@@ -6,14 +6,13 @@ use std::process;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::support::toy::config;
-use apprentice::actors::{ErrorCode, KeyView};
-use apprentice::frontends::{Client, ClientError, CurveKey, Identity};
+use apprentice::client::{Client, ClientError, CurveKey, ErrorCode, Identity, KeyView, Order};
 use apprentice::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
 use apprentice::service::{Data, Service};
 use apprentice::store;
-use apprentice::tenancy::{Clock, Order, Role};
+use apprentice::tenancy::{Clock, Role};
 use apprentice::world::Stage;
+use apprentice_testkit::toy::config;
 
 /// Seconds since 1970, some day in 2026.
 const TODAY: u64 = 1_790_000_000;
@@ -48,7 +47,7 @@ impl ActorSystem {
             role: Role::Gateway,
             label: "robot".to_owned(),
         };
-        assert_eq!((actors.order(Order::Open), actors.order(admit)), (1, 1));
+        assert_eq!((actors.order(Order::Add), actors.order(admit)), (1, 1));
         actors
     }
 

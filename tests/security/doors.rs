@@ -7,14 +7,16 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::support::toy::config;
-use apprentice::actors::{Ask, DoorAsk, ErrorCode, Response, TenantAsk, TenantVerb};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{
+    Ask, Client, ClientError, Command, CurveKey, DoorAsk, ErrorCode, Identity, Order, Response,
+    TenantAsk, TenantVerb, fresh_id,
+};
 use apprentice::ids::{PublicKey, TenantId, UserId};
 use apprentice::service::{Data, Service, StartError, server_key_file};
-use apprentice::tenancy::{Order, Quotas, Role};
+use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::Stage;
+use apprentice_testkit::toy::config;
 
 /// Within this a client must know that it is not let in.
 const BOUND: Duration = Duration::from_secs(20);
@@ -42,13 +44,15 @@ fn bells(data: Data) -> Service {
 /// Carries out orders and waits until they are durable.
 fn order(service: &Service, name: &str, order: Order) {
     let (sender, receiver) = mpsc::channel();
-    service.registrar().order(tenant(name), order, move |obeyed| sender.send(obeyed).unwrap());
+    service
+        .registrar()
+        .order(tenant(name), order.into(), move |obeyed| sender.send(obeyed).unwrap());
     receiver.recv_timeout(BOUND).unwrap().unwrap();
 }
 
 fn admit(service: &Service, name: &str, role: Role) -> CurveKey {
     let key = CurveKey::new().unwrap();
-    order(service, name, Order::Open);
+    order(service, name, Order::Add);
     let label = format!("{role} of {name}");
     order(service, name, Order::Admit { key: *key.public(), role, label });
     key
@@ -111,7 +115,7 @@ fn two_labs_with_one_name_for_their_people_do_not_meet() {
     assert_eq!((a.status().unwrap().utterances, b.status().unwrap().utterances), (1, 0));
     // Not even a request id brings out the other's reply.
     let id = fresh_id();
-    let command = |text: &str| apprentice::session::Command::Say { utterance: text.to_owned() };
+    let command = |text: &str| Command::Say { utterance: text.to_owned() };
     let mine = a.command_again(id, command("ring the brass bell")).unwrap();
     let theirs = b.command_again(id, command("ring the glass bell")).unwrap();
     assert_ne!(mine, theirs);
@@ -125,7 +129,7 @@ fn an_unknown_key_is_told_so_in_one_sentence_and_comes_in_once_it_is_admitted() 
     let key = CurveKey::new().unwrap();
     let ada = connect(&service, &key, "ada");
     not_let_in(&ada);
-    order(&service, "lab-a", Order::Open);
+    order(&service, "lab-a", Order::Add);
     let admit = Order::Admit { key: *key.public(), role: Role::Gateway, label: "late".to_owned() };
     order(&service, "lab-a", admit);
     ada.hello().unwrap();
@@ -371,8 +375,8 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     local.order(None, admit(&host_key, Role::Operator)).unwrap();
     let host = connect(&service, &host_key, "host");
     for (lab, key) in [("lab-a", &a_key), ("lab-b", &b_key)] {
-        assert_eq!(host.order(Some(tenant(lab)), Order::Open).unwrap().recorded, 1);
-        assert_eq!(host.order(Some(tenant(lab)), Order::Open).unwrap().recorded, 0);
+        assert_eq!(host.order(Some(tenant(lab)), Order::Add).unwrap().recorded, 1);
+        assert_eq!(host.order(Some(tenant(lab)), Order::Add).unwrap().recorded, 0);
         host.order(Some(tenant(lab)), admit(key, Role::Operator)).unwrap();
     }
     let names = |client: &Client, only: Option<&str>| -> Vec<String> {
@@ -401,7 +405,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
         (Some("lab-b"), Order::Retire { key: *b_key.public(), overlap_seconds: 0 }),
         (Some("lab-b"), disable()),
         (Some("local"), admit(&CurveKey::new().unwrap(), Role::Operator)),
-        (Some("lab-c"), Order::Open),
+        (Some("lab-c"), Order::Add),
         (None, Order::SetQuotas(quotas)),
         (None, disable()),
     ] {
@@ -575,7 +579,7 @@ fn a_service_that_cannot_answer_handshakes_ends_and_answers_nobody() {
     };
     let endpoint = line().strip_prefix("serving with keys at ").unwrap().to_owned();
     let server = line().strip_prefix("server key ").unwrap().to_owned();
-    let server = apprentice::frontends::read_public(&server).unwrap();
+    let server = apprentice::client::read_public(&server).unwrap();
     let key = CurveKey::new().unwrap();
     for _ in 0..2 {
         let client = connect_to(&endpoint, &key, server).with_patience(Duration::from_secs(1));

@@ -9,12 +9,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use apprentice::actors::{OrderError, TenantRegistry};
-use apprentice::frontends::Client;
+use apprentice::client::{Client, OnClash, Told};
 use apprentice::ids::{StreamId, TenantId, UserId};
 use apprentice::language::Outcome;
 use apprentice::replay::{self, AuditReport, Scrutiny};
 use apprentice::service::{Config, Data, Service};
-use apprentice::session::{OnClash, Told};
 use apprentice::store;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;

@@ -4,16 +4,13 @@
 mod vectors;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use crate::support::python::python;
 use apprentice::evidence::{Proof, VerifierKey, verify};
+use apprentice_testkit::paths::root;
+use apprentice_testkit::python::python;
 use vectors::{Vector, key, vectors};
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn folder() -> PathBuf {
     root().join("schema/golden/proofs")

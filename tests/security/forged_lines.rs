@@ -3,28 +3,29 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command as Process;
 use std::sync::Arc;
 
-use crate::support::diary::Diary;
-use crate::support::python::python;
-use crate::support::ran::run;
-use crate::support::toy::config;
-use apprentice::actors::{Ask, ErrorCode, PersonAsk, Response};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{
+    Ask, Client, ClientError, Command, ErrorCode, Order, PersonAsk, Phase, RejectionCode, Response,
+    fresh_id,
+};
 use apprentice::events::{Batch, Event, Head, KeyAdmitted, TenantDisabled, TenantOpened};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, ClientError, fresh_id};
 use apprentice::ids::{PublicKey, RequestId, StreamId, TenantId, Timestamp, UserId};
 use apprentice::learning::Recipe;
 use apprentice::limits::{LABEL_BYTES_MAX, UTTERANCE_BYTES_MAX};
 use apprentice::plain;
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, Phase, RejectionCode};
 use apprentice::store::{self, Store};
-use apprentice::tenancy::{Order, Role};
+use apprentice::tenancy::Role;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::python::python;
+use apprentice_testkit::ran::run;
+use apprentice_testkit::toy::config;
 
 /// One of each kind that older versions let into names and utterances, and those that they refused.
 const HOSTILE: [char; 16] = [
@@ -154,7 +155,7 @@ fn names_that_look_like_others_are_for_nobody_new() {
     }
     let ada = connect(&service, "ada");
     for name in ["-", "--data", "-lab"] {
-        let (code, message) = failed(ada.order(Some(tenant(name)), Order::Open));
+        let (code, message) = failed(ada.order(Some(tenant(name)), Order::Add));
         assert_eq!(code, ErrorCode::Refused);
         assert!(message.contains("may not begin with '-'"), "{message}");
     }
@@ -223,7 +224,7 @@ fn old() -> Old {
         let mut diary = Diary::new(&domain, &store, name, recipe);
         let say = |diary: &mut Diary<Household>, words: &str| {
             let command = Command::Say { utterance: words.to_owned() };
-            diary.give_as_of_old(&command).unwrap();
+            diary.give_as_of_old(&command.into()).unwrap();
         };
         diary.start("free kitchen");
         say(&mut diary, SAID);
@@ -233,13 +234,13 @@ fn old() -> Old {
         diary.teach(&[1]);
         while let Some(said) = diary.session.status().to_teach.first().map(|said| said.seq) {
             let (actions, on_clash) = (Vec::new(), Default::default());
-            diary.accept(&Command::Teach { explains: said, actions, on_clash });
+            diary.accept(&Command::Teach { explains: said, actions, on_clash }.into());
         }
         diary.learn();
         diary.start("free kitchen");
         say(&mut diary, SAID);
         if closes {
-            diary.give_as_of_old(&Command::Close { reason: evil() }).unwrap();
+            diary.give_as_of_old(&Command::Close { reason: evil() }.into()).unwrap();
         }
     }
     tenant_of_old(&store);
@@ -396,7 +397,7 @@ fn a_revealed_record_adds_no_line_to_what_both_readers_of_a_proof_say() {
     honest("verify --json", &fine(&["verify", &proof, "--key", &key, "--json"]), &[]);
     // Another log's key, with a name that drives a terminal: named in the refusal.
     let Some(python) = python("cryptography") else { return };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/verify.py");
+    let script = apprentice_testkit::paths::root().join("tools/verify.py");
     let second = |key: &str| {
         let mut command = Process::new(&python);
         let ran = command.arg(&script).args([&proof, "--key", key]).output().unwrap();

@@ -1,15 +1,6 @@
 //! What nobody may do: come in, forge, read, rewrite or exhaust. Runs the program; see
 //! `tests/README.md`.
 
-#[path = "../support"]
-mod support {
-    pub mod diary;
-    pub mod front;
-    pub mod python;
-    pub mod ran;
-    pub mod toy;
-}
-
 mod clocks;
 mod doors;
 mod erasure;

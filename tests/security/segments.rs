@@ -7,27 +7,26 @@ use std::process::Command as Process;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use crate::support::diary::Diary;
-use crate::support::front::hand_in;
-use crate::support::toy::Bells;
 use apprentice::actors::{
-    ActorSettings, ActorSystem, AnswerTo, Ask, Failure, OrderError, Response, TenantRegistry,
-    fold_tenant, wall_clock,
+    ActorSettings, ActorSystem, AnswerTo, Failure, OrderError, TenantRegistry, fold_tenant,
+    wall_clock,
 };
+use apprentice::client::{Ask, Command, Query, Response, fresh_id};
 use apprentice::events::{Batch, Event, EventKind, Head, Record, SessionClosed};
 use apprentice::evidence::{Proof, VerifyError, verify};
-use apprentice::frontends::fresh_id;
 use apprentice::ids::{Seq, StreamId, StreamKey, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::replay::{
     AuditReport, CheckpointsError, ProveError, Scrutiny, Through, Wanted, audit, due_segments,
     newest_checkpoint, prove, signer_of, streams_of,
 };
-use apprentice::session::{Command, Query};
 use apprentice::store::{
     EventLog, MemoryLog, Pending, ReadError, SealedRecords, Store, open, open_memory,
 };
 use apprentice::world::Stage;
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::front::hand_in;
+use apprentice_testkit::toy::Bells;
 
 fn tiny() -> &'static str {
     Recipe::builtin("tiny").unwrap()

@@ -8,17 +8,18 @@ use std::path::PathBuf;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use apprentice::actors::{ArchiveAsk, Ask, DoorAsk, PersonAsk, Response};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, CurveKey, Follower, Identity, fresh_id, read_public};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{
+    ArchiveAsk, Ask, Client, CurveKey, DoorAsk, Follower, Identity, Order, PersonAsk, Query,
+    Response, fresh_id, read_public,
+};
 use apprentice::ids::{PublicKey, Seq, StreamKey, TenantId, UserId};
 use apprentice::limits::{KEY_CONNECTIONS_MAX, TOPICS_MAX};
 use apprentice::service::{Data, Service};
-use apprentice::session::Query;
-use apprentice::tenancy::{Order, Role};
+use apprentice::tenancy::Role;
 use apprentice::world::Stage;
 
-use crate::support::toy;
+use apprentice_testkit::toy;
 
 /// What a test may take, hung or not.
 const BOUND: Duration = Duration::from_secs(60);
@@ -73,7 +74,7 @@ impl Served {
         let (host, key) =
             (Client::connect(&self.open, user("host")).unwrap(), CurveKey::new().unwrap());
         let admit = Order::Admit { key: *key.public(), role, label: String::new() };
-        for order in [Order::Open, admit] {
+        for order in [Order::Add, admit] {
             host.order(Some(lab(name)), order).unwrap();
         }
         key
@@ -280,9 +281,11 @@ fn bells() -> (Service, CurveKey) {
     config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
     let (service, key) = (Service::start(config).unwrap(), CurveKey::new().unwrap());
     let admit = Order::Admit { key: *key.public(), role: Role::Gateway, label: String::new() };
-    for order in [Order::Open, admit] {
+    for order in [Order::Add, admit] {
         let (sender, receiver) = std::sync::mpsc::channel();
-        service.registrar().order(lab("lab"), order, move |obeyed| sender.send(obeyed).unwrap());
+        service
+            .registrar()
+            .order(lab("lab"), order.into(), move |obeyed| sender.send(obeyed).unwrap());
         receiver.recv_timeout(BOUND).unwrap().unwrap();
     }
     (service, key)

@@ -4,20 +4,19 @@
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use crate::support::front::hand_in;
-use crate::support::toy::{self, Bells};
-use apprentice::actors::{
-    ActorSettings, ActorSystem, AnswerTo, Ask, ErrorCode, Failure, Front, PersonAsk, Response,
-    wall_clock,
+use apprentice::actors::{ActorSettings, ActorSystem, AnswerTo, Failure, Front, wall_clock};
+use apprentice::client::{
+    Ask, Command, ErrorCode, OnClash, PersonAsk, Phase, Query, RejectionCode, Response, Told,
+    fresh_id,
 };
 use apprentice::events::{Batch, Event, SessionClosed};
-use apprentice::frontends::fresh_id;
 use apprentice::ids::{RequestId, Seq, TenantId, Timestamp, UserId};
 use apprentice::learning::Recipe;
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, OnClash, Phase, Query, RejectionCode, Told};
 use apprentice::store::{self, Fault, FaultPlan, FaultyLog, Store};
 use apprentice::world::Stage;
+use apprentice_testkit::front::hand_in;
+use apprentice_testkit::toy::{self, Bells};
 
 fn settings(store: Store, failure: &Failure) -> ActorSettings<Bells> {
     ActorSettings {

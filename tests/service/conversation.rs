@@ -1,7 +1,6 @@
 //! The example client of `schema/examples/`, which knows nothing of this crate, against the real
 //! service with the real household.
 
-use std::path::Path;
 use std::process::Command as Process;
 use std::sync::Arc;
 
@@ -9,7 +8,7 @@ use apprentice::ids::UserId;
 use apprentice::service::{Config, Data, Service};
 use apprentice::world::household::Household;
 
-use crate::support::python::python;
+use apprentice_testkit::python::python;
 
 #[test]
 fn a_stranger_with_forty_lines_of_python_holds_a_conversation() {
@@ -17,7 +16,7 @@ fn a_stranger_with_forty_lines_of_python_holds_a_conversation() {
     let mut config = Config::new(Arc::new(Household::new()), Data::Memory);
     config.listen = vec!["tcp://127.0.0.1:0".to_owned()];
     let service = Service::start(config).unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("schema/examples/conversation.py");
+    let script = apprentice_testkit::paths::root().join("schema/examples/conversation.py");
     let text = std::fs::read_to_string(&script).unwrap();
     assert!(text.lines().count() <= 40, "forty lines are promised");
     let output =

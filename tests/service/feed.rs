@@ -3,15 +3,15 @@
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use crate::support::toy::config;
-use apprentice::actors::ErrorCode;
-use apprentice::frontends::{
-    BEAT, Client, ClientError, CurveKey, FeedMessage, FollowError, Followed, Follower, Identity,
+use apprentice::client::{
+    BEAT, Client, ClientError, CurveKey, ErrorCode, FeedMessage, FollowError, Followed, Follower,
+    Identity,
 };
 use apprentice::ids::{Seq, TenantId, UserId, WithinTenant};
 use apprentice::service::{Data, Service, StartError};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
+use apprentice_testkit::toy::config;
 
 const BOUND: Duration = Duration::from_secs(60);
 /// A word that only this lab's people say.

@@ -1,13 +1,5 @@
 //! The running service, from its actors to its sockets. Uses the library alone; see `tests/README.md`.
 
-#[path = "../support"]
-mod support {
-    pub mod front;
-    pub mod python;
-    pub mod toy;
-    pub mod value;
-}
-
 mod actors;
 mod conversation;
 mod embed;

@@ -5,16 +5,17 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::support::toy::{Bells, Fickle, config};
-use apprentice::actors::{Ask, DoorAsk, ErrorCode, PersonAsk, Response};
-use apprentice::frontends::wire::{Request, decode_response, encode_request};
-use apprentice::frontends::{Client, ClientError, fresh_id};
+use apprentice::client::wire::{Request, decode_response, encode_request};
+use apprentice::client::{
+    Ask, Client, ClientError, Command, DoorAsk, ErrorCode, OnClash, PersonAsk, Phase,
+    RejectionCode, Reply, Response, Told, fresh_id,
+};
 use apprentice::ids::{RequestId, UserId};
 use apprentice::language::Outcome;
 use apprentice::limits::{FRAME_BYTES_MAX, MAILBOX_MAX};
 use apprentice::service::{Data, Service, StartError};
-use apprentice::session::{Command, OnClash, Phase, RejectionCode, Reply, Told};
 use apprentice::world::Stage;
+use apprentice_testkit::toy::{Bells, Fickle, config};
 
 const LONG: Duration = Duration::from_secs(60);
 
@@ -168,6 +169,7 @@ fn faults_are_answered_when_the_id_can_be_read() {
         (replace(b"\xa1v\x01", b"\xa1v\x07"), ErrorCode::UnsupportedVersion),
         (replace(b"done", b"dine"), ErrorCode::UnknownVerb),
         (replace(b"done", b"open"), ErrorCode::InternalVerb),
+        (replace(b"\xa4done", b"\x81\xaefinish_retrain\x80"), ErrorCode::InternalVerb),
         (replace(b"\xa1m", b"\xa1\xff"), ErrorCode::Malformed),
     ] {
         stranger.send(&[&bytes]);
@@ -178,13 +180,6 @@ fn faults_are_answered_when_the_id_can_be_read() {
             "{response:?}"
         );
     }
-    let internal = Command::FinishRetrain {
-        recipe: apprentice::ids::Digest::ZERO,
-        outcome: Err("because I say so".to_owned()),
-    };
-    stranger.ask(id, Ask::Person(PersonAsk::Command(internal)));
-    let (_, response) = stranger.answer();
-    assert!(matches!(&response, Response::Error(f) if f.code == ErrorCode::InternalVerb));
     assert_eq!(service.counts().refused, 5);
     assert_eq!(service.awake(), 0, "nobody was woken by any of them");
 }

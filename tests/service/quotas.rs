@@ -4,21 +4,22 @@
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use crate::support::front::hand_in;
-use crate::support::toy::{self, Bells, Gate};
 use apprentice::actors::{
-    ActorSettings, ActorSystem, AnswerTo, Ask, DoorAsk, Failure, Front, PersonAsk, Quota, Refusals,
-    Registrar, Response, wall_clock,
+    ActorSettings, ActorSystem, AnswerTo, Failure, Front, Refusals, Registrar, wall_clock,
 };
-use apprentice::frontends::{Client, ClientError, CurveKey, Identity, fresh_id};
+use apprentice::client::{
+    Ask, Client, ClientError, Command, CurveKey, DoorAsk, Identity, OnClash, Order, PersonAsk,
+    Phase, Query, Quota, Response, fresh_id,
+};
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::limits::KEY_FILE_BYTES;
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, OnClash, Phase, Query};
 use apprentice::store::{self, Store};
-use apprentice::tenancy::{Order, Quotas, Role};
+use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::Stage;
+use apprentice_testkit::front::hand_in;
+use apprentice_testkit::toy::{self, Bells, Gate};
 
 const LONG: Duration = Duration::from_secs(30);
 
@@ -47,14 +48,14 @@ fn user(number: usize) -> UserId {
 
 fn obey(registrar: &Registrar, tenant: &TenantId, order: Order) {
     let (sender, receiver) = mpsc::channel();
-    registrar.order(tenant.clone(), order, move |obeyed| sender.send(obeyed).unwrap());
+    registrar.order(tenant.clone(), order.into(), move |obeyed| sender.send(obeyed).unwrap());
     receiver.recv_timeout(Duration::from_secs(60)).expect("an answer").expect("it is obeyed");
 }
 
 /// Labs with these quotas.
 fn allow(actors: &ActorSystem, labs: &[(&TenantId, Quotas)]) {
     for (tenant, quotas) in labs {
-        obey(actors.registrar(), tenant, Order::Open);
+        obey(actors.registrar(), tenant, Order::Add);
         obey(actors.registrar(), tenant, Order::SetQuotas(*quotas));
     }
 }
@@ -65,7 +66,7 @@ fn service(data: Data, labs: &[(&TenantId, Quotas)]) -> Service {
     config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
     let service = Service::start(config).unwrap();
     for (tenant, quotas) in labs {
-        obey(service.registrar(), tenant, Order::Open);
+        obey(service.registrar(), tenant, Order::Add);
         obey(service.registrar(), tenant, Order::SetQuotas(*quotas));
     }
     service
@@ -349,7 +350,7 @@ fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
             Command::StartEpisode { stage: Stage::Task { task: "no such".to_owned(), seed: 1 } },
         ];
         for command in declined {
-            let name = command.name();
+            let name = format!("{command:?}");
             let response = ask(&front, &lab, number, fresh_id(), command.into());
             assert!(matches!(response, Response::Rejected(_)), "{name}: {response:?}");
         }

@@ -7,11 +7,10 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::sync::Arc;
 
-use apprentice::frontends::Client;
+use apprentice::client::{Client, Told};
 use apprentice::ids::UserId;
 use apprentice::language::{Outcome, Step};
 use apprentice::service::{Config, Data, Service};
-use apprentice::session::Told;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
 use serde::Deserialize;
@@ -67,7 +66,7 @@ fn scene(step: &Step, sentence: &str) -> String {
 
 #[test]
 fn a_hundred_recorded_sentences_go_through_the_real_socket() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let data = apprentice_testkit::paths::root().join("../shared/data");
     let path = data.join("alfred_utterances.jsonl.gz");
     if !path.exists() {
         println!("skipped: there are no recorded sentences at {}", path.display());

@@ -4,12 +4,12 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::support::toy::config;
-use apprentice::frontends::{Client, ClientError, fresh_id};
+use apprentice::client::{Client, ClientError, Command, OnClash, RejectionCode, Reply, fresh_id};
 use apprentice::ids::{RequestId, Seq, UserId};
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, OnClash, RejectionCode, Reply};
+use apprentice::session;
 use apprentice::world::Stage;
+use apprentice_testkit::toy::config;
 
 const LONG: Duration = Duration::from_secs(60);
 
@@ -120,7 +120,8 @@ fn every_pair(client: &Client, asked: &[Asked]) {
             match client.command_again(used.id, other.clone()) {
                 Err(ClientError::Rejected { code, message }) => {
                     assert_eq!(code, RejectionCode::RequestIdReused, "{other:?}: {message}");
-                    for part in [used.command.name(), &used.id.to_string(), "new id"] {
+                    let name = session::Command::from(used.command.clone()).name();
+                    for part in [name, &used.id.to_string(), "new id"] {
                         assert!(message.contains(part), "{part:?} is missing in {message}");
                     }
                     refused += 1;

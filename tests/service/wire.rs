@@ -7,18 +7,18 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use crate::support::value::Value;
-use apprentice::actors::{
-    ArchiveAsk, Ask, Busy, DoorAsk, ErasedView, ErrorCode, Failed, FeedView, Frame, HeadView,
-    Heads, Hello, KeyView, Ordered, PersonAsk, PlainRecords, PlainView, Quota, QuotaExceeded,
-    Rejected, Response, SealedRecords, SealedView, TenantAsk, TenantVerb, TenantView, Waited,
-};
-use apprentice::events::{Ending, PersonErased, Report};
-use apprentice::frontends::FeedMessage;
-use apprentice::frontends::wire::{
+use apprentice::client::wire::{
     COMMANDS, ORDERS, QUERIES, Request, decode_request, decode_response, encode_request,
     encode_response,
 };
+use apprentice::client::{
+    ActionView, ArchiveAsk, Ask, Busy, Command, DoorAsk, ErasedView, ErrorCode, Failed,
+    FeedMessage, FeedView, Frame, HeadView, Heads, Hello, KeyView, KnownExemplar, OnClash, Order,
+    Ordered, PersonAsk, Phase, PlainRecords, PlainView, Query, Quota, QuotaExceeded, Rejected,
+    RejectionCode, Reply, Response, SealedRecords, SealedView, Status, Teachable, TenantAsk,
+    TenantVerb, TenantView, Told, Waited,
+};
+use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::ids::{
     Digest, PublicKey, RequestId, Seq, Signature, StreamKey, TenantId, Timestamp, UserId,
 };
@@ -27,12 +27,9 @@ use apprentice::language::{
     Use,
 };
 use apprentice::limits::{FRAME_BYTES_MAX, UTTERANCE_BYTES_MAX};
-use apprentice::session::{
-    ActionView, Command, KnownExemplar, OnClash, Phase, Query, RejectionCode, Reply, Status,
-    Teachable, Told,
-};
-use apprentice::tenancy::{Order, Quotas, Role};
+use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::{Stage, Thing, View};
+use apprentice_testkit::value::Value;
 
 fn id() -> RequestId {
     RequestId(std::array::from_fn(|index| index as u8))
@@ -80,7 +77,7 @@ fn requests() -> Vec<(&'static str, Ask)> {
             Ask::Archive(ArchiveAsk::Plain { stream: STREAM, from: seq(40), limit: 100 }),
         ),
         ("list", order(None, TenantVerb::List)),
-        ("add", give(Order::Open)),
+        ("add", give(Order::Add)),
         (
             "admit",
             give(Order::Admit {
@@ -482,7 +479,7 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn page() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("schema/wire.md")
+    apprentice_testkit::paths::root().join("schema/wire.md")
 }
 
 /// The page's examples: the name in `<!-- example: NAME -->`, and the fenced text that follows.

@@ -6,22 +6,23 @@ use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 
 use apprentice::actors::{
-    DirectoryEffect, DirectoryInput, Effect, ErrorCode, Input, Letter, NotDelivered, OrderError,
-    PersonAsk, Response, TenantRegistry, Undelivered, wall_clock,
+    DirectoryEffect, DirectoryInput, Effect, Input, Letter, NotDelivered, OrderError,
+    TenantRegistry, Undelivered, wall_clock,
 };
+use apprentice::client::{ErrorCode, PersonAsk, Reply, Response};
 use apprentice::events::Head;
 use apprentice::ids::{StreamId, TenantId, Timestamp};
 use apprentice::invariants::Invariant;
 use apprentice::learning;
 use apprentice::replay::{Through, keep_mind, keep_snapshot, read_back, rebuild};
-use apprentice::session::{Reply, Session};
+use apprentice::session::Session;
 use apprentice::store::Pending;
 
 use crate::defects::Defect;
 use crate::oracle::{Broken, broken};
 use crate::process::{Actor, Job, MAILBOX_MAX, Mail, Parcel, Ticket, ToDirectory};
-use crate::support::toy::Bells;
 use crate::system::{System, beginning};
+use apprentice_testkit::toy::Bells;
 
 type ToSeat = Input<Bells, Ticket>;
 

@@ -5,16 +5,8 @@
 //!
 //! `cargo xtask simulate --seeds N [--seed S]` runs as many seeds as wanted.
 
-#[path = "../support/chance.rs"]
-mod chance;
-#[path = "../support"]
-mod support {
-    pub mod toy;
-}
-
 mod counts;
 mod defects;
-mod dice;
 mod disturbed;
 mod drive;
 mod oracle;
@@ -25,7 +17,7 @@ mod system;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use chance::number;
+use apprentice_testkit::chance::number;
 use counts::Counts;
 use defects::{DEFECTS, Defect};
 use oracle::Broken;

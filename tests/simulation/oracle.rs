@@ -4,15 +4,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use apprentice::client::Phase;
 use apprentice::events::{Event, Record};
 use apprentice::ids::{Digest, RequestId, Seq, StreamId};
 use apprentice::invariants::Invariant;
 use apprentice::replay::{Minds, rebuild};
-use apprentice::session::{Phase, Session, reply_of};
+use apprentice::session::{Session, reply_of};
 use apprentice::store::{EventLog, Store};
 
 use crate::people::{Heard, Person};
-use crate::support::toy::Bells;
+use apprentice_testkit::toy::Bells;
 
 /// A law that was broken, and how.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,11 +1,12 @@
 //! What people ask, how often they ask again, and what they have heard: the ledger.
 
+use apprentice::client::{Command, OnClash, Phase, Reply};
 use apprentice::ids::{RequestId, StreamId, TenantId, UserId};
-use apprentice::session::{Command, OnClash, Phase, Reply, Session};
+use apprentice::session::Session;
 use apprentice::world::Stage;
 
-use crate::dice::Dice;
-use crate::support::toy::Bells;
+use apprentice_testkit::dice::Dice;
+use apprentice_testkit::toy::Bells;
 
 /// One person and everything that they asked, oldest first.
 pub struct Person {

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use apprentice::actors::{
-    Attention, Directory, DirectoryInput, NewSession, PersonAsk, Presence, Seat, TenantRegistry,
-    Timer,
+    Attention, Directory, DirectoryInput, NewSession, Presence, Seat, TenantRegistry, Timer,
 };
+use apprentice::client::PersonAsk;
 use apprentice::ids::{Digest, RequestId, StreamId, UserId};
 use apprentice::learning::{Lesson, Mind, Recipe};
 use apprentice::replay::Minds;
@@ -15,7 +15,7 @@ use apprentice::session::Session;
 use apprentice::store::Pending;
 use apprentice::world::Domain;
 
-use crate::support::toy::Bells;
+use apprentice_testkit::toy::Bells;
 
 /// Requests that wait for one seat.
 pub const MAILBOX_MAX: usize = 2;

@@ -3,22 +3,23 @@
 
 use std::sync::{Arc, OnceLock};
 
-use apprentice::actors::{NewSession, PersonAsk, Response};
+use apprentice::actors::NewSession;
+use apprentice::client::{PersonAsk, Phase, Query, Response};
 use apprentice::ids::{RequestId, StreamId, TenantId, UserId};
 use apprentice::invariants::Invariant;
 use apprentice::learning::{self, Recipe};
 use apprentice::replay::mind_origin;
-use apprentice::session::{Phase, Query, Session};
+use apprentice::session::Session;
 use apprentice::store::{EventLog, FaultPlan, FaultyLog, Keys, MemoryLog, SeededEntropy, Store};
 
 use crate::counts::Counts;
 use crate::defects::Defect;
-use crate::dice::Dice;
 use crate::disturbed::Disturbed;
 use crate::oracle::{Broken, Truth, broken};
 use crate::people::{Heard, Person};
 use crate::process::{Asked, Job, Parcel, Process, Ticket, ToDirectory};
-use crate::support::toy::Bells;
+use apprentice_testkit::dice::Dice;
+use apprentice_testkit::toy::Bells;
 
 pub struct System {
     pub dice: Dice,

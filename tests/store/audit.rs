@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::support::diary::Diary;
-use crate::support::toy::Bells;
 use apprentice::events::{Batch, Event, Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId};
 use apprentice::language::Outcome;
@@ -14,6 +12,8 @@ use apprentice::store::{
     AppendError, Draft, EventLog, Pending, ReadError, SealedRecords, SeededEntropy, Store, Walk,
     open, open_memory,
 };
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::toy::Bells;
 
 const ALL: Scrutiny = Scrutiny { repropose: true, retrain: true };
 const PLAIN: Scrutiny = Scrutiny { repropose: false, retrain: false };

@@ -4,16 +4,17 @@
 use std::fs;
 use std::sync::Arc;
 
-use crate::support::toy::Bells;
+use apprentice::client::OnClash;
 use apprentice::events::{Event, Report};
 use apprentice::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use apprentice::learning::{Mind, Recipe, code_digest, train};
 use apprentice::replay::{
     Minds, RebuildError, Work, keep_mind, keep_snapshot, mind_origin, rebuild, state_origin,
 };
-use apprentice::session::{Command, OnClash, Outstanding, Proposed, Session};
+use apprentice::session::{Command, Outstanding, Proposed, Session};
 use apprentice::store::{CacheCounts, Origin, Store, open};
 use apprentice::world::Stage;
+use apprentice_testkit::toy::Bells;
 
 /// Ada, who has taught one lesson, in a directory with a snapshot and a kept mind.
 struct Ada {

@@ -1,12 +1,5 @@
 //! The event log, its caches and its audit. Uses the library alone; see `tests/README.md`.
 
-#[path = "../support"]
-mod support {
-    pub mod chance;
-    pub mod diary;
-    pub mod toy;
-}
-
 mod audit;
 mod caches;
 mod log_conformance;

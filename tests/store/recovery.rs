@@ -6,11 +6,11 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::support::chance::{below, seed};
 use apprentice::events::Record;
 use apprentice::ids::{StreamId, TenantId};
 use apprentice::store::conformance::{batch, read_all, stream};
 use apprentice::store::{SeededEntropy, Store, open};
+use apprentice_testkit::chance::{below, seed};
 
 /// Where the child process of the kill test keeps its data.
 const CHILD_DIR: &str = "APPRENTICE_TEST_CHILD_DIR";

@@ -1,20 +1,17 @@
 //! The protocol *conversation*: what it counts, on transcripts of our own and on those that ship.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use apprentice::learning::Recipe;
-use apprentice::study::conversation::{Class, ConversationReport, Counts, conversation};
-use apprentice::study::people::People;
-use apprentice::study::report::{Setting, Teachers};
-use apprentice::study::scenes::Staging;
+use apprentice_study::conversation::{Class, ConversationReport, Counts, conversation};
+use apprentice_study::people::People;
+use apprentice_study::report::{Setting, Teachers};
+use apprentice_study::scenes::Staging;
+use apprentice_testkit::paths::root;
 use serde_json::Value;
 use tempfile::TempDir;
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
 
 /// A directory with transcripts `one.txt`, `two.txt`, … beside the kitchen of most transcripts.
 fn directory(transcripts: &[&str]) -> TempDir {
@@ -174,7 +171,7 @@ done
 
 #[test]
 fn the_shipped_conversations_are_measured() {
-    let directory = root().join("data/conversations/look");
+    let directory = root().join("crates/study/data/conversations/look");
     let report = measured("default", &directory);
     let (mut said, mut nothing) = (0, 0);
     for of in &report.transcripts {

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use apprentice::learning::Recipe;
-use apprentice::study::corpus::Corpus;
-use apprentice::study::goals::goals;
-use apprentice::study::one_shot::one_shot;
-use apprentice::study::people::People;
-use apprentice::study::primitives::primitives;
-use apprentice::study::report::{Setting, Teachers};
-use apprentice::study::scenes::Staging;
+use apprentice_study::corpus::Corpus;
+use apprentice_study::goals::goals;
+use apprentice_study::one_shot::one_shot;
+use apprentice_study::people::People;
+use apprentice_study::primitives::primitives;
+use apprentice_study::report::{Setting, Teachers};
+use apprentice_study::scenes::Staging;
 use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
@@ -351,7 +351,7 @@ const ROUNDING: f64 = 0.0001;
 
 #[test]
 fn recorded_sentences_are_understood_no_worse_than_committed() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = apprentice_testkit::paths::root();
     let recorded = |name: &str| -> PathBuf { root.join("../shared/data").join(name) };
     let (steps, whole) =
         (recorded("alfred_utterances.jsonl.gz"), recorded("alfred_goals.jsonl.gz"));
@@ -420,7 +420,7 @@ fn slice(recipe: &str, steps: &Path, whole: &Path) -> Slice {
         ("wrong", share(shares.wrong, shares.n)),
         ("untaught_accepted", share(primitives.untaught_accepted, primitives.untaught_n)),
     ];
-    let lessons = |report: apprentice::study::lessons::LessonsReport| {
+    let lessons = |report: apprentice_study::lessons::LessonsReport| {
         let figures = report.figures;
         let named = [
             ("same_sentence", figures.same_sentence),

@@ -5,9 +5,6 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::support::diary::Diary;
-use crate::support::ran::run;
-use crate::support::toy::Bells;
 use apprentice::events::Event;
 use apprentice::grounding::Moment;
 use apprentice::language::Outcome;
@@ -15,9 +12,12 @@ use apprentice::learning::{Mind, Recipe, train};
 use apprentice::replay::{keep_mind, streams_of};
 use apprentice::session::{self, Outstanding, Session};
 use apprentice::store::{Store, copy_private, open, open_memory};
-use apprentice::study::rerun::{Change, Rerun, Variant, rerun, table};
 use apprentice::world::Domain;
 use apprentice::world::household::Household;
+use apprentice_study::rerun::{Change, Rerun, Variant, rerun, table};
+use apprentice_testkit::diary::Diary;
+use apprentice_testkit::ran::run;
+use apprentice_testkit::toy::Bells;
 use serde_json::Value;
 
 fn tiny() -> &'static str {

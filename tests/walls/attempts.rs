@@ -1,6 +1,6 @@
 //! Every verb × every name × every trick × every role.
 
-use apprentice::frontends::wire::{COMMANDS, INTERNAL_COMMANDS, ORDERS, QUERIES};
+use apprentice::client::wire::{COMMANDS, INTERNAL_COMMANDS, ORDERS, QUERIES};
 use apprentice::ids::RequestId;
 use serde::Serialize;
 use serde_json::{Value, json};

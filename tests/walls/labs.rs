@@ -5,12 +5,13 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use apprentice::actors::{ArchiveAsk, Ask, DoorAsk, Response};
-use apprentice::frontends::{Client, Counts, CurveKey, Identity, wire};
+use apprentice::client::{
+    ArchiveAsk, Ask, Client, Command, CurveKey, DoorAsk, Identity, OnClash, Response, Status, wire,
+};
+use apprentice::frontends::Counts;
 use apprentice::ids::{PublicKey, RequestId, StreamId, StreamKey, TenantId, UserId};
 use apprentice::learning::Recipe;
 use apprentice::service::{self, Config, Data};
-use apprentice::session::{Command, OnClash, Status};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;

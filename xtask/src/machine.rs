@@ -51,7 +51,7 @@ fn target() -> PathBuf {
 ///
 /// - errors: it does not build.
 pub fn release_binary() -> Result<PathBuf, String> {
-    let what = ["--quiet", "--package", "apprentice", "--bin", "apprentice"];
+    let what = ["--quiet", "--package", "apprentice-cli", "--bin", "apprentice"];
     run("cargo", &[&["build", "--release"], &what[..]].concat())?;
     Ok(target().join("release/apprentice"))
 }
@@ -74,12 +74,15 @@ pub fn optimised_binary() -> Result<PathBuf, String> {
 }
 
 /// The packages that a binary is built from and that are ours.
-const OWN: [&str; 5] = [
+const OWN: [&str; 8] = [
     "apprentice",
+    "apprentice-cli",
+    "apprentice-client",
     "apprentice-core",
     "apprentice-household",
     "apprentice-migrations",
     "apprentice-mind",
+    "apprentice-study",
 ];
 
 /// The service with our own packages built by other settings. The packages it depends on are those
@@ -93,7 +96,7 @@ fn built_otherwise(name: &str, settings: &[&str]) -> Result<PathBuf, String> {
             arguments.extend(["--config".to_owned(), setting]);
         }
     }
-    let what = ["--quiet", "--package", "apprentice", "--bin", "apprentice"];
+    let what = ["--quiet", "--package", "apprentice-cli", "--bin", "apprentice"];
     arguments.extend(what.map(str::to_owned));
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     run("cargo", &arguments)?;

@@ -3,11 +3,14 @@
 //! no file, no thread.
 
 pub mod fairness;
+pub mod header;
 pub mod ids;
 pub mod invariants;
 pub mod language;
 pub mod limits;
 pub mod numerics;
+pub mod outcomes;
 pub mod plain;
 pub mod sabotage;
+pub mod tenants;
 pub mod world;

@@ -157,6 +157,14 @@ fn is_never_plain(c: char) -> bool {
     c.is_control() || ignorable || no_character
 }
 
+/// `1 action`, `2 actions`.
+pub fn count(number: impl Into<u64>, noun: &str) -> String {
+    match number.into() {
+        1 => format!("1 {noun}"),
+        n => format!("{n} {noun}s"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,9 +8,9 @@ use super::{Directory, DirectoryEffect, DirectoryInput, Letter, NotDelivered, Un
 use crate::actors::awake::{Awake, AwakeCount};
 use crate::actors::meters::Meters;
 use crate::actors::presence::{Attention, Presence};
-use crate::actors::response::{ErrorCode, Hello, Response};
 use crate::actors::submit::{AnswerTo, Submit};
 use crate::actors::{Erased, OrderError, Registrar};
+use crate::client::{ErrorCode, Hello, Response};
 use crate::ids::{StreamId, TenantId, UserId};
 use crate::limits::DIRECTORY_QUEUE_MAX;
 use crate::sabotage;

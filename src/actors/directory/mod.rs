@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use self::erasure::Erasure;
 use super::presence::{Attention, Presence};
-use super::response::Response;
+use crate::client::Response;
 use crate::ids::{StreamId, TenantId, UserId};
 
 /// Knows who is awake, wakes people when somebody asks for them, and alone puts people to sleep: a

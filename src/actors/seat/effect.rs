@@ -1,7 +1,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::actors::response::{PersonAsk, Response};
+use crate::client::{PersonAsk, Response};
 use crate::events::{Batch, Durable, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::learning::{Lesson, Mind, Recipe};

@@ -13,12 +13,12 @@ use std::time::Duration;
 pub use effect::{Effect, Input, Timer};
 
 use self::turn::{Doing, Work};
-use super::response::{PersonAsk, Response, Waited};
+use crate::client::{PersonAsk, Phase, Response, Told, Waited};
 use crate::ids::{RequestId, StreamId, Timestamp, UserId};
 use crate::invariants::Invariant;
 use crate::learning::{Mind, Recipe};
 use crate::limits::{WAIT_S_MAX, WAITERS_MAX};
-use crate::session::{Outstanding, Phase, Session, Told};
+use crate::session::{Outstanding, Session};
 use crate::world::Domain;
 
 /// What a new session is opened with, the same for everybody.
@@ -165,6 +165,7 @@ impl<D: Domain, C> Seat<D, C> {
         };
         match ask {
             PersonAsk::Command(command) => {
+                let command = command.into();
                 self.perform(Work { command, request, at, caller: Some(caller) }, fresh);
             }
             PersonAsk::Query(query) => match view::answer(&self.new, session, query) {

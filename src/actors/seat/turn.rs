@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::{Effect, Seat, Stage};
 use crate::actors::defect::defect;
-use crate::actors::response::{ErrorCode, Response, Waited};
+use crate::client::{ErrorCode, Phase, Reply, Response, Told, Waited};
 use crate::events::{Durable, Record, Report};
 use crate::ids::{Digest, RequestId, Timestamp};
 use crate::learning::{self, Mind};
 use crate::sabotage;
-use crate::session::{Command, Divergence, Phase, Proposed, Reply, Session, Told, Turn};
+use crate::session::{Command, Divergence, Proposed, Session, Turn};
 use crate::store::AppendError;
 use crate::world::Domain;
 

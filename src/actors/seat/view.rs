@@ -2,8 +2,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::NewSession;
 use crate::actors::defect::defect;
-use crate::actors::response::{Rejected, Response};
-use crate::session::{Query, RejectionCode, Session, Status};
+use crate::client::{Query, Rejected, RejectionCode, Response, Status};
+use crate::session::Session;
 use crate::world::Domain;
 
 /// - errors: what to answer when the session panicked; it is then to be left.

@@ -13,11 +13,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
-use crate::support::chance;
+use apprentice::client::RejectionCode;
 use apprentice::learning::{Recipe, train};
-use apprentice::session::{Command, RejectionCode};
+use apprentice::session::Command;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use apprentice_testkit::chance;
 use person::{Counts, House, Person, live};
 
 fn house() -> House {

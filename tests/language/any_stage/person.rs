@@ -2,21 +2,19 @@
 
 use std::sync::Arc;
 
+use apprentice::client::{OnClash, Phase, RejectionCode, Reply};
 use apprentice::events::{Ending, Event, Record};
 use apprentice::ids::{Digest, RequestId, Seq, Timestamp, UserId};
 use apprentice::language::{Outcome, Step};
 use apprentice::learning::{Mind, train};
-use apprentice::session::{
-    Command, OnClash, Outstanding, Phase, Proposed, Rejection, RejectionCode, Reply, Session,
-    reply_of,
-};
+use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session, reply_of};
 use apprentice::store::SeededEntropy;
 use apprentice::world::household::{Household, Kind};
 use apprentice::world::{Domain, StageError};
 
 use super::scenes::{pick, said, stage};
-use crate::support::chance::below;
-use crate::support::recorded::recorded;
+use apprentice_testkit::chance::below;
+use apprentice_testkit::recorded::recorded;
 
 /// Where everybody begins.
 pub struct House {

@@ -4,7 +4,7 @@ use apprentice::store::SeededEntropy;
 use apprentice::world::Stage;
 use apprentice::world::household::{Kind, Room, Task};
 
-use crate::support::chance::below;
+use apprentice_testkit::chance::below;
 
 /// A kind as people say it: `CounterTop` is a counter top.
 pub fn said(kind: &str) -> String {

@@ -7,15 +7,16 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
+use apprentice::client::Told;
 use apprentice::events::{Event, Record};
 use apprentice::ids::{RequestId, Timestamp, UserId};
 use apprentice::language::{Answer, Outcome, Program, Step, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
-use apprentice::session::{Command, Proposed, Rejection, Session, Told, Turn, reply_of};
+use apprentice::session::{Command, Proposed, Rejection, Session, Turn, reply_of};
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Domain, Stage, View};
 
-use crate::support::recorded::recorded;
+use apprentice_testkit::recorded::recorded;
 
 /// The recipe that all these tests are about.
 pub const RECIPE: &str = "default-2";

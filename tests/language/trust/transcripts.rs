@@ -1,17 +1,17 @@
 //! Conversations with the answers that one would expect, played against a real service.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use apprentice::cli::TranscriptFile;
 use apprentice::learning::Recipe;
 use apprentice::service::{Config, Data, Service};
 use apprentice::world::household::Household;
+use apprentice_cli::TranscriptFile;
 
 use super::talk::RECIPE;
 
 fn files() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/language/trust/transcripts");
+    let folder = apprentice_testkit::paths::root().join("tests/language/trust/transcripts");
     let entries = std::fs::read_dir(&folder).unwrap();
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "txt"));

@@ -1,0 +1,28 @@
+//! What a run draws by chance, and how it is repeated.
+
+use apprentice::store::{Entropy, OsEntropy, SeededEntropy};
+
+/// A number that the environment chooses, or what stands for it.
+pub fn number(variable: &str, otherwise: u64) -> u64 {
+    let text = std::env::var(variable).ok();
+    text.map_or(otherwise, |text| {
+        text.parse().unwrap_or_else(|_| panic!("{variable} is {text:?}, which is no number"))
+    })
+}
+
+/// A seed that is printed, so that a failure can be tried again; threads and the disk have their
+/// own say in what happens under it.
+pub fn seed() -> u64 {
+    let mut bytes = [0; 8];
+    OsEntropy.fill(&mut bytes);
+    let seed = number("APPRENTICE_SEED", u64::from_be_bytes(bytes));
+    println!("seed: APPRENTICE_SEED={seed}");
+    seed
+}
+
+/// A number below `bound`, which is at least 1.
+pub fn below(dice: &SeededEntropy, bound: usize) -> usize {
+    let mut bytes = [0; 8];
+    dice.fill(&mut bytes);
+    usize::try_from(u64::from_be_bytes(bytes) % bound.max(1) as u64).unwrap()
+}

@@ -1,0 +1,25 @@
+//! Handing in what a gateway would.
+
+use apprentice::actors::{AnswerTo, Front, Submit};
+use apprentice::client::{Ask, DoorAsk};
+use apprentice::ids::{RequestId, TenantId, UserId};
+
+/// Counts a request against its tenant's quotas and hands it in.
+pub fn hand_in(
+    front: &Front,
+    (tenant, user): (TenantId, UserId),
+    request: RequestId,
+    ask: Ask,
+    mut answer: AnswerTo,
+) {
+    if let Err(refused) = front.let_in(&tenant, &ask, &mut answer) {
+        return answer.send(*refused);
+    }
+    let taken = match ask {
+        Ask::Person(ask) => front.submit(Submit { tenant, user, request, ask, answer }),
+        Ask::Archive(ask) => front.ask_archive(tenant, ask, answer),
+        Ask::Door(DoorAsk::Hello) => front.greet(answer),
+        other => panic!("a gateway answers {other:?}"),
+    };
+    assert!(taken.is_ok(), "nobody else is asking");
+}
