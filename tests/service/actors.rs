@@ -177,7 +177,7 @@ fn a_training_that_panics_leaves_the_mind_as_it_was() {
 }
 
 #[test]
-fn whoever_sleeps_goes_on_where_they_were() {
+fn a_sleeping_user_wakes_with_the_same_state() {
     let (store, failure) = (store::open_memory(), Failure::default());
     let status = |actors: &ActorSystem| match ask(
         &actors.front(),
