@@ -175,7 +175,7 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
     counts.acknowledged += promised.len();
 }
 
-/// If a failure at this call may go unnoticed: making a key is tried again before anything else,
+/// True if a failure at this call may go unnoticed: making a key is tried again before anything else,
 /// and the tree is signed again when it has grown.
 fn may_pass(path: &str) -> bool {
     ["/cache/", "/keys/users", "/checkpoints"].iter().any(|part| path.contains(part))

@@ -42,7 +42,7 @@ pub struct Counts {
     pub asked_again: usize,
 }
 
-/// If this machine can run the test.
+/// True if this machine can run the test.
 ///
 /// - errors: what is missing.
 pub fn able() -> Result<(), String> {
@@ -144,7 +144,7 @@ pub fn cut_without_syncs(images: usize, seed: u64) -> Option<String> {
     None
 }
 
-/// If `fsync` and `fdatasync` of the service work.
+/// True if `fsync` and `fdatasync` of the service work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Syncs {
     Honest,

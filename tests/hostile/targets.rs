@@ -29,7 +29,7 @@ use apprentice::world::{Domain, Stage};
 use crate::support::diary::Diary;
 use crate::support::samples::samples;
 
-/// If the bytes were read. A refusal is just as good.
+/// True if the bytes were read. A refusal is just as good.
 pub type Decoder = dyn Fn(&[u8]) -> bool + Send + Sync;
 
 pub struct Target {

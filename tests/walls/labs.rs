@@ -218,7 +218,7 @@ impl Lab {
         StreamId::of_tenant(&self.tenant()).to_string()
     }
 
-    /// If `bytes` contain words of this lab.
+    /// True if `bytes` contain words of this lab.
     pub fn is_in(&self, bytes: &[u8]) -> bool {
         super::contains(bytes, self.canary.as_bytes())
     }
