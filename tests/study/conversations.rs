@@ -1,4 +1,4 @@
-//! The protocol *conversation*: what it counts, on transcripts of our own and on those that ship.
+//! What the protocol *conversation* counts, on our own transcripts and on those that ship.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A directory with transcripts `one.txt`, `two.txt`, … beside the kitchen of most transcripts.
+/// A directory with transcripts `one.txt`, `two.txt`, … next to the kitchen of most transcripts.
 fn directory(transcripts: &[&str]) -> TempDir {
     let directory = TempDir::new().unwrap();
     let kitchen = directory.path().join("kitchen.toml");
@@ -61,7 +61,7 @@ fn adds_up(counts: &Counts) {
     assert!(ahead <= right, "{counts:?}");
 }
 
-/// The paper's recipe carries out exactly what is said, so each answer is known.
+/// The paper's recipe carries out exactly what it understands, so each answer is known.
 const EVERY_CLASS: [&str; 2] = [
     "\
 scene kitchen.toml
@@ -166,7 +166,7 @@ done
     let directory = directory(&[said]);
     fs::write(directory.path().join("kitchen.toml"), scene).unwrap();
     let report = measured("paper", directory.path());
-    // The nearest mug is the other one; from the table, it is the one that is meant.
+    // The nearest mug is the other one. Seen from the table, it is the right one.
     assert_eq!(report.total.something_else, 1, "{report}");
     assert_eq!((report.cases[0].line, report.total.right), (4, 2), "{report}");
     assert!(report.cases[0].answered.ends_with("on Mug 1"), "{report}");
