@@ -1,4 +1,4 @@
-//! Data directories that releases wrote.
+//! Data directories that earlier releases wrote.
 #![allow(dead_code)]
 
 use std::fs;
@@ -6,12 +6,12 @@ use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// A file that stands beside what `release` wrote.
+/// A file next to the directory that `release` wrote.
 pub fn golden(release: &str, name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(release).join(name)
 }
 
-/// A directory that `release` wrote, unpacked: `data` or another archive's name.
+/// A directory that `release` wrote, unpacked. The archive is `data` or has another name.
 pub fn released(release: &str, archive: &str) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let packed = fs::File::open(golden(release, &format!("{archive}.tar.gz"))).unwrap();

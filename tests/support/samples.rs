@@ -1,4 +1,4 @@
-//! One sample event or more of every kind, and what each field means.
+//! At least one sample event of every kind, and the meaning of each field.
 #![allow(dead_code)]
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use apprentice::language::{
 };
 use serde_json::json;
 
-/// Name of the golden files, and the event. The name of a kind's first sample is the kind's.
+/// Name of the golden files, and the event. The first sample of a kind has the name of the kind.
 pub fn samples() -> Vec<(&'static str, Event)> {
     vec![
         ("session_opened", Event::SessionOpened(session_opened())),
@@ -49,7 +49,7 @@ pub fn samples() -> Vec<(&'static str, Event)> {
     ]
 }
 
-/// Fields whose inside belongs to the domain.
+/// Fields whose content belongs to the domain.
 pub const DOCUMENTS: [&str; 2] = ["episode_started.scene", "episode_started.task"];
 
 /// What each field means. A field without a line here fails the test.
@@ -254,7 +254,7 @@ fn by_the_baseline() -> Interpreted {
     event
 }
 
-/// "Robot, put the second mug on the table": words chose the mug, the world the table.
+/// "Robot, put the second mug on the table": the words chose the mug, the world chose the table.
 fn chosen() -> Interpreted {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let chosen =
