@@ -197,7 +197,7 @@ fn skip(reason: &str) {
     println!("skipped: {reason}");
 }
 
-/// Runs `self-test` of a binary. `words` are the command that starts it.
+/// Runs `self-test` of a binary. `before` are the words of the command line before its name.
 fn self_test(before: &[&str], binary: &Path) -> String {
     let words: Vec<&str> = before.iter().copied().chain([binary.to_str().unwrap()]).collect();
     let output = Command::new(words[0]).args(&words[1..]).arg("self-test").output();

@@ -1,6 +1,6 @@
-//! The map must be the territory: the two tables of `ARCHITECTURE.md` are read from that file and
-//! every `use` in `src/` is held against them. A change to a table is a design change. The tables of
-//! `tests/README.md` are compared with the tests that there are.
+//! Compares every `use` in `src/` and `crates/` with the two tables of `ARCHITECTURE.md`. A change to
+//! such a table is a change of the design. Also compares the tables of `tests/README.md` with the
+//! tests, and checks the links between pages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -27,8 +27,8 @@ fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// Where source files are: the service, and the crates below it, with the room that a crate's own
-/// files belong to, if it has no rooms.
+/// The folders of source files: the service, and the crates below it. A crate without rooms is one
+/// room, which is named here.
 const SOURCES: [(&str, Option<&str>); 4] = [
     ("src", None),
     ("crates/core/src", None),
@@ -36,8 +36,8 @@ const SOURCES: [(&str, Option<&str>); 4] = [
     ("crates/mind/src", None),
 ];
 
-/// Every source file with its path below its `src/`, comments and string contents blanked out. The
-/// household is one room: its files stand below `household/`.
+/// Every source file with its path below its `src/`, without comments and the contents of strings.
+/// The household is one room, so its paths begin with `household/`.
 fn sources() -> Vec<(String, String)> {
     let mut found = Vec::new();
     for (folder, room) in SOURCES {
@@ -53,7 +53,7 @@ fn sources() -> Vec<(String, String)> {
     found
 }
 
-/// The file or folder that stands for a room, or for a place inside one.
+/// The file or folder of a room, or of a place inside one.
 fn place_of(name: &str) -> Option<PathBuf> {
     SOURCES.iter().find_map(|(folder, room)| {
         let folder = root().join(folder);
@@ -111,8 +111,8 @@ fn strip(text: &str) -> String {
     out
 }
 
-/// The rows of the table in `ARCHITECTURE.md` whose header's first cell is `head`: from each name
-/// in backquotes of the first cell to the text of the second.
+/// The rows of the table in `ARCHITECTURE.md` whose header begins with `head`: each name in
+/// backquotes in the first cell, with the text of the second cell.
 fn table(head: &str) -> BTreeMap<String, String> {
     let map = read(&root().join("ARCHITECTURE.md"));
     let cells = |line: &str| -> Vec<String> {
@@ -140,7 +140,7 @@ fn room(file: &str) -> &str {
     file.split(['/', '.']).next().unwrap()
 }
 
-/// Whether a file holds tests only.
+/// True if a file contains only tests.
 fn is_test(file: &str) -> bool {
     let mut parts = file.split('/');
     parts.any(|part| matches!(part, "tests" | "tests.rs" | "bench.rs"))
@@ -251,7 +251,7 @@ fn every_dependency_stands_in_the_map_or_the_list_with_its_reason() {
         let row = format!("| `{name}` |");
         assert!(reasons.contains(&row), "docs/dependencies.md has no line for `{name}`");
     }
-    // A version stands in one place.
+    // A version is written in one place.
     for (folder, _) in SOURCES {
         let manifest = root().join(folder).parent().unwrap().join("Cargo.toml");
         let manifest: toml::Table = read(&manifest).parse().unwrap();
@@ -308,7 +308,7 @@ fn links_between_pages_lead_somewhere() {
     assert!(dead.is_empty(), "{}", dead.join("\n"));
 }
 
-/// The names of what lies in a folder, without the ending `.rs`; folders of code have one, too.
+/// The names of the modules in a folder, which are files and folders, without the ending `.rs`.
 fn modules_in(folder: &Path) -> BTreeSet<String> {
     let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let code = paths.filter(|path| {
@@ -346,7 +346,7 @@ fn every_test_module_is_compiled_and_has_its_line() {
     let own = section("Executables of their own").expect("the page has their section");
     assert_eq!(lines(own), alone, "tests/README.md and the executables of their own");
 
-    // A file that nobody declares would never be run.
+    // A file that is not declared would never be run.
     let mut waiting = vec![tests];
     while let Some(folder) = waiting.pop() {
         let paths = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
@@ -429,7 +429,7 @@ fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What the simulator drives must be all that decides.
+/// All decisions must be in the code that the simulator drives.
 #[test]
 fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
     let pure = ["actors/seat/", "actors/directory/mod.rs", "actors/directory/erasure.rs"];

@@ -144,7 +144,10 @@ pub const MEANINGS: &[(&str, &str)] = &[
         "the reading of the wall clock, in µs since 1970; a held record time is no reading",
     ),
     ("tenant_disabled.reason", "why the tenant is shut out"),
-    ("quotas_set.quotas.awake_users", "people awake at the same time; null: only the machine's limit"),
+    (
+        "quotas_set.quotas.awake_users",
+        "people awake at the same time; null: only the machine's limit",
+    ),
     ("quotas_set.quotas.in_flight", "requests accepted and not yet answered"),
     ("quotas_set.quotas.utterances_per_second", "utterances a second, in the long run"),
     ("quotas_set.quotas.burst", "utterances at once after a silence"),
