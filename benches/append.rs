@@ -1,5 +1,5 @@
-//! Durable appends per second with 1, 16 and 256 writers that wait for their own, beside a raw
-//! file that is appended to and synced in the same groups, in the same run on the same disk.
+//! Durable appends per second with 1, 16 and 256 writers. Each writer waits for its own record. The
+//! same run measures a raw file on the same disk, with appends and syncs in the same groups.
 //!
 //! `cargo bench --bench append`
 
@@ -16,7 +16,7 @@ use apprentice::store::open;
 
 /// Bytes of an event's text.
 const EVENT_BYTES: usize = 200;
-/// What header, nonce, salt and seal add.
+/// Bytes that header, nonce, salt and seal add.
 const RECORD_BYTES: usize = EVENT_BYTES + Header::BYTES + 24 + 32 + 16;
 const MEASURE: Duration = Duration::from_secs(4);
 
@@ -25,7 +25,7 @@ fn main() {
     println!("| writers | raw file /s | log /s | log / raw | log p50 | log p99 |");
     println!("|---|---|---|---|---|---|");
     for writers in [1, 16, 256] {
-        // Alternating, so that a slow minute of the disk hits both.
+        // In turns, so that a slow minute of the disk affects both.
         let runs = [(); 2].map(|()| (raw(&dir, writers), log(&dir, writers)));
         let [raw, log] = runs.into_iter().fold([vec![], vec![]], |[mut raws, mut logs], run| {
             raws.extend(run.0);
@@ -46,7 +46,7 @@ fn main() {
     }
 }
 
-/// Runs `append` on as many threads as writers and collects how long each call took.
+/// Runs `append` on one thread for each writer, and collects how long each call took.
 fn measure<F: FnMut()>(writers: usize, make: impl Fn(usize) -> F + Sync) -> Vec<Duration> {
     let deadline = Instant::now() + MEASURE;
     std::thread::scope(|scope| {

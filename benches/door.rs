@@ -1,7 +1,7 @@
-//! How fast an answer comes through the socket, durable. `cargo bench --bench door`
+//! How fast a durable answer comes through the socket. `cargo bench --bench door`
 //!
-//! The real household, a data directory on the disk that `target/` is on, and the recipe `default` or
-//! another: `cargo bench --bench door -- default-1`.
+//! The real household, a data directory on the disk of `target/`, and the recipe `default` or
+//! another one: `cargo bench --bench door -- default-1`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -41,7 +41,7 @@ fn begin(client: &Client) {
     client.start(stage).expect("an episode starts");
 }
 
-/// Says the same again and again; the robot goes to and fro.
+/// Says the same requests again and again; the robot goes to and fro.
 fn talk(client: &Client, count: usize) -> Vec<Duration> {
     (0..count)
         .map(|index| {
@@ -98,7 +98,7 @@ fn main() {
     percentiles("durable answer, one of many people", times);
     service.stop().expect("it stops");
 
-    // Two people and one place: each request wakes a sleeper with some 300 utterances behind them.
+    // Two people, and only one may be awake: each request wakes a user with about 300 utterances.
     let service = start(&directory, 1);
     let pair = [connect(&service, "person 0"), connect(&service, "person 1")];
     let woken: Vec<Duration> = (0..100)

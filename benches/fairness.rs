@@ -1,10 +1,9 @@
 //! What one lab's flood costs another lab. `cargo bench --bench fairness`
 //!
-//! Two labs in one service, on the disk that `target/` is on. The quiet lab says 20 utterances a
-//! second; the flood sends a hundred times as many, without waiting for answers. Short stretches
-//! with and without the flood follow one another, so that both see the same machine. Once with a
-//! quota for the flooding lab, and once with none: then all that holds it are the turns that labs
-//! take.
+//! Two labs in one service, on the disk of `target/`. The quiet lab says 20 utterances a second.
+//! The flood sends a hundred times as many, without waiting for answers. Short periods with and
+//! without the flood follow one another, so that both are measured on the same machine. One run has
+//! a quota for the flooding lab. The other has none: then only the turns between labs limit it.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -27,7 +26,7 @@ const QUIET: u64 = 20;
 const TIMES: u64 = 100;
 /// People of the flooding lab.
 const CROWD: usize = 64;
-/// How many times a stretch without the flood and one with it are measured.
+/// How many times a period without the flood and one with it are measured.
 const ROUNDS: usize = 10;
 const STRETCH: Duration = Duration::from_secs(3);
 /// Utterances of one episode.
@@ -70,7 +69,7 @@ fn connect(service: &Service, key: &CurveKey, number: usize) -> Client {
     Client::connect_as(endpoint, user(number), identity).expect("it connects")
 }
 
-/// Sends while it is switched on, as fast as it should, whatever comes back.
+/// Sends at its full rate while it is switched on, and does not wait for answers.
 struct Flood {
     on: AtomicBool,
     over: AtomicBool,
@@ -124,7 +123,7 @@ impl Flood {
     }
 }
 
-/// The quiet lab's person speaks at an even pace for one stretch.
+/// The quiet lab's person speaks at an even pace for one period.
 fn talk(client: &Client, said: &mut usize, times: &mut Vec<Duration>) {
     let start = Instant::now();
     for turn in 0.. {
@@ -182,7 +181,7 @@ fn measure(service: &Service, name: &str, quotas: Quotas) {
             state.on.store(true, Ordering::Relaxed);
             talk(&client, &mut said, &mut beside);
             state.on.store(false, Ordering::Relaxed);
-            // What the flood has left in queues belongs to its stretch.
+            // What the flood has left in queues belongs to its period.
             talk(&client, &mut said, &mut Vec::new());
         }
         state.over.store(true, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! From the last lesson to a mind that can answer, and one answer. Read the ratios between the
+//! The time from the last lesson to a mind that can answer, and the time of one answer. Compare the
 //! rows of one run; `docs/performance.md` has the table.
 
 mod support;
@@ -13,7 +13,7 @@ use apprentice::world::household::Household;
 use apprentice::world::{Domain, Stage};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
-/// Seeds of the household; the rest of the examples are lessons.
+/// Seeds of the household. The other examples are lessons.
 const SEEDS: usize = 44;
 
 fn training(criterion: &mut Criterion) {

@@ -1,6 +1,6 @@
 //! Rebuilding and auditing, as ratios of one run. `cargo bench --bench replay`
 //!
-//! The real household and the recipe `default`; the log is sled's, on the disk that `target/` is on.
+//! The real household and the recipe `default`. The log is sled's, on the disk of `target/`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,9 +16,9 @@ use apprentice::store::{Store, open, open_memory};
 use apprentice::world::household::Household;
 use apprentice_testkit::diary::Diary;
 
-/// Episodes of one life.
+/// Episodes of one history.
 const EPISODES: usize = 5;
-/// People with that life each.
+/// How many people have that history.
 const PEOPLE: usize = 400;
 const RUNS: usize = 15;
 const AUDITS: usize = 4;
@@ -49,7 +49,7 @@ fn life(domain: &Arc<Household>) -> Diary<Household> {
     diary
 }
 
-/// Gives each of these people that life, with groups of appends.
+/// Gives each of these people that history, with appends in groups.
 fn populate(store: &Store, records: &[Record]) -> u64 {
     let person = |number: usize| UserId::new(&format!("person {number}")).expect("a good name");
     let mut people: Vec<(UserId, StreamId, Head)> = (0..PEOPLE)
@@ -78,7 +78,7 @@ fn populate(store: &Store, records: &[Record]) -> u64 {
     (records.len() * PEOPLE) as u64
 }
 
-/// CPU time of this process, in seconds: what the clock hides on a busy machine.
+/// CPU time of this process in seconds, which the load of the machine does not change.
 fn cpu_seconds() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux tells");
     let after_name = stat.rsplit(')').next().expect("a name in brackets");
@@ -99,8 +99,7 @@ fn median(mut work: impl FnMut()) -> Duration {
     times[RUNS / 2]
 }
 
-/// Interprets every utterance and trains every mind, and nothing else: what an audit that does it
-/// again cannot do without.
+/// Only interprets every utterance and trains every mind: the least that an audit of them must do.
 fn bare(domain: &Arc<Household>, records: &[Record]) -> (Duration, Duration) {
     let (mut interpreting, mut training) = (Duration::ZERO, Duration::ZERO);
     let mut session = Session::new(domain.clone());

@@ -1,6 +1,6 @@
-//! A closed directory with one flipped bit, or cut short: whatever is read afterwards is what was
-//! recorded, or somebody is told. `APPRENTICE_FLIPS` and `APPRENTICE_SEED` give another
-//! number and repeat a run.
+//! A closed directory with one flipped bit, or a truncated file. Either what is read afterwards is
+//! what was recorded, or the damage is reported. `APPRENTICE_FLIPS` gives another number, and
+//! `APPRENTICE_SEED` repeats a run.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,9 +21,9 @@ const BINARY: &str = env!("CARGO_BIN_EXE_apprentice");
 const FLIPS: u64 = 2_000;
 const TRUNCATIONS: usize = 200;
 const PEOPLE: usize = 5;
-/// One flip of so many is also shown to the program itself, and to its salvage.
+/// One flip in this number is also given to the program itself, and to its salvage.
 const SAMPLE: usize = 25;
-/// Nobody waits longer for an answer about a few megabytes.
+/// The longest time for an answer about a few megabytes.
 const PATIENCE: Duration = Duration::from_secs(120);
 const MEMORY_KB_MAX: u64 = 2 * 1024 * 1024;
 
@@ -37,7 +37,7 @@ struct Original {
     shown: Vec<u8>,
 }
 
-/// One way to hurt a directory.
+/// One way to damage a directory.
 #[derive(Debug, Clone)]
 struct Wound {
     file: PathBuf,
@@ -58,7 +58,7 @@ enum Outcome {
     Reported,
 }
 
-/// In memory where there is such a place: thousands of copies, each synced many times.
+/// In memory if possible: thousands of copies are made, and each is synced many times.
 fn room() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     match memory.is_dir() {
@@ -78,7 +78,7 @@ fn original() -> Original {
             stream(&store.keys, "local", &format!("person {person}")),
         ));
     }
-    // Everybody at once, as in life: pages hold records of many.
+    // All people together, as in a real service: pages contain records of many.
     for record in 0..40 {
         for (person, (_, who)) in people.iter().enumerate() {
             let text = format!("{person} {record} ").repeat(if record == 20 { 2_000 } else { 20 });
@@ -103,7 +103,7 @@ fn original() -> Original {
     Original { dir, files, records, people, shown }
 }
 
-/// What a service would find: everybody's records by name. Errors are sentences.
+/// What a service would find: the records of all people, by name. Errors are sentences.
 fn read_everything(
     dir: &Path,
     people: &[(UserId, StreamId)],
@@ -131,7 +131,7 @@ fn show(dir: &Path) -> std::process::Output {
 }
 
 impl Original {
-    /// Half the wounds hit the log's database, the others any file, small ones included.
+    /// Half of the damage is in the log's database, the other half in any file, also small ones.
     fn wound(&self, dice: &SeededEntropy, cut: bool) -> Wound {
         loop {
             let file = match below(dice, 2) {
@@ -139,7 +139,7 @@ impl Original {
                 _ => self.files[below(dice, self.files.len())].clone(),
             };
             let bytes = fs::read(self.dir.path().join(&file)).unwrap();
-            // Zeros are mostly space that was made in advance.
+            // Zeros are mostly space that was allocated in advance.
             let used: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at] != 0).collect();
             let Some(&at) = used.get(below(dice, used.len())) else { continue };
             let kind = match cut {
@@ -232,7 +232,7 @@ impl Original {
         let nothing_lost = said["lost"].as_array().unwrap().is_empty();
         assert_eq!(nothing_lost, code == 0, "{wound:?}: {said}");
         assert!(kept == all || code == 1, "{wound:?}: {kept} of {all} and nothing lost");
-        // What was saved is read by the ordinary way in, unless the keys themselves are hurt.
+        // What was salvaged is opened in the normal way, unless the keys themselves are damaged.
         match read_everything(&out, &self.people) {
             Ok(found) => {
                 for (who, records) in &self.records {
@@ -254,7 +254,7 @@ fn is_a_sentence(text: &str) -> bool {
     !text.is_empty() && !text.contains('\n') && !INNARDS.iter().any(|word| text.contains(word))
 }
 
-/// Judges each wound on all cores. A wound without an answer is a hang and ends the test.
+/// Tests each damaged directory, on all cores. One without an answer hangs, and ends the test.
 fn judge_all(original: Original, wounds: Vec<Wound>) -> BTreeMap<Outcome, usize> {
     apprentice::store::check_with(BINARY.into());
     let (original, wounds) = (Arc::new(original), Arc::new(wounds));

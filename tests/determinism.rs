@@ -1,7 +1,7 @@
-//! The same lessons give the same mind, to the bit: in any build, with any kernel, on any processor,
-//! with any number of threads, and after a life in the log. A pinned digest (`crates/mind/data/pins.txt`) that
-//! changes is a decision: say why in the commit, and in the changelog, since old logs then name
-//! minds that training no longer gives.
+//! The same lessons give the same mind, bit for bit: in any build, with any kernel, on any
+//! processor, with any number of threads, and after records in the log. A change of a pinned digest
+//! (`crates/mind/data/pins.txt`) is a decision. Say why in the commit and in the changelog, because
+//! old logs then name minds that training no longer gives.
 
 use std::env;
 use std::fs;
@@ -22,7 +22,7 @@ use apprentice::world::household::Household;
 use apprentice_study::known_minds::{histories, lessons, stage, train_all};
 
 const RECIPES: [&str; 6] = Recipe::BUILTIN;
-/// One of each kind of parser; the halves of the last are in it.
+/// One recipe of each kind of parser. The last one contains both of its parts.
 const KINDS: [&str; 3] = ["paper", "default-2", "seq2seq-grammar"];
 
 fn mind(recipe: &str, history: &str) -> Mind {
@@ -96,14 +96,14 @@ fn what_was_forgotten_leaves_no_trace() {
         forgotten.truncate(2);
         let gone = forgotten.remove(1);
         assert_eq!(gone.utterance.as_str(), "chill the mug");
-        // "one" is "four" of somebody who was never taught the other three.
+        // "one" is "four" of a person who was never taught the other three.
         let never = pinned("mind", recipe.name(), "one");
         let after = train(&household, &recipe, &forgotten).unwrap().digest();
         assert_eq!(Some(after), never, "{}", recipe.name());
     }
 }
 
-/// People who teach at the same time; the first says what the history `one` says.
+/// People who teach at the same time. The first says what the history `one` says.
 const PEOPLE: [(&str, &str); 8] = [
     ("ada", "wash the coffee mug"),
     ("ben", "rinse the mug"),
@@ -120,7 +120,7 @@ fn teach(service: &Service, user: &str, utterance: &str) {
     let robot = service.connect(UserId::new(user).unwrap()).unwrap();
     robot.start(stage()).unwrap();
     robot.say(utterance).unwrap();
-    // A parser that always answers may have done something by guess.
+    // A parser that always answers may have acted on a guess.
     let before = robot.status().unwrap().actions.len() as u32;
     let steps = ["go to the mug", "pick up the mug", "go to the sink", "put the mug in the sink"];
     let more = ["turn on the faucet", "turn off the faucet", "pick up the mug"];
@@ -183,7 +183,7 @@ fn any_number_of_trainers_a_replay_and_a_life_without_caches_give_the_same_minds
     }
 }
 
-/// What `cargo xtask test` hands over, or a reason to skip; with `CI=true` a skip is a failure.
+/// A binary from `cargo xtask test`, or a reason to skip. With `CI=true` a skip is a failure.
 fn handed_over(variable: &str) -> Option<PathBuf> {
     let path = env::var_os(variable).map(PathBuf::from);
     if path.is_none() {
@@ -197,7 +197,7 @@ fn skip(reason: &str) {
     println!("skipped: {reason}");
 }
 
-/// Runs a binary's `self-test` under these words of command line.
+/// Runs `self-test` of a binary. `before` are the words of the command line before its name.
 fn self_test(before: &[&str], binary: &Path) -> String {
     let words: Vec<&str> = before.iter().copied().chain([binary.to_str().unwrap()]).collect();
     let output = Command::new(words[0]).args(&words[1..]).arg("self-test").output();
@@ -232,7 +232,7 @@ fn other_processors_train_the_same_minds() {
         let printed = self_test(&["qemu-x86_64", "-cpu", processor], &binary);
         kernels.push(printed.split("kernel ").nth(1).unwrap().trim().to_owned());
     }
-    // Otherwise the emulation has shown nothing that this machine would not have.
+    // Otherwise the emulation shows nothing that this machine does not show.
     assert_eq!(kernels[0], "Sse2", "Nehalem has no AVX2");
     assert!(kernels.contains(&"Avx2".to_owned()), "{kernels:?}");
 }

@@ -1,5 +1,5 @@
-//! Fifty thousand records of one person: waking, looking back and auditing hold a few of them in
-//! memory, never all.
+//! Fifty thousand records of one person: waking the user, replay and audit hold only a few of them
+//! in memory.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
@@ -18,8 +18,8 @@ use apprentice_testkit::toy::Bells;
 const RECORDS: u64 = 50_000;
 /// Utterances of one episode.
 const UTTERANCES: usize = 100;
-/// What reading a history may take, whatever its length: far less than this history has. The log
-/// in memory hands out a list of its frames, 16 bytes each.
+/// The memory that reading a history may take, whatever its length. It is far less than this
+/// history. The log in memory returns a list of its frames, 16 bytes each.
 const BYTES_MAX: usize = 4 * 1024 * 1024;
 
 /// Counts the bytes that are in use, and the most that were.
@@ -28,7 +28,7 @@ struct Counting;
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: everything is handed on to the system's allocator as it came.
+// SAFETY: every call goes to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let now = NOW.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
@@ -45,7 +45,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// What `work` gives, and the most bytes it held beside what was there before.
+/// The result of `work`, and the most bytes it held beyond those held before.
 fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = NOW.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
@@ -80,7 +80,7 @@ fn fifty_thousand_records_wake_replay_and_are_audited_in_little_memory() {
     let mut episodes = 0_u64;
     let mut lesson = None;
     while diary.session.head().seq < RECORDS {
-        // A person who goes on learning, and changes a lesson now and then.
+        // A person who continues to learn, and sometimes changes a lesson.
         let teaches = episodes.is_multiple_of(100);
         if let (true, Some(lesson)) = (teaches, lesson) {
             diary.accept(&Command::Forget { lesson });
@@ -136,7 +136,7 @@ fn fifty_thousand_records_wake_replay_and_are_audited_in_little_memory() {
     assert_eq!(watched.advanced.into_inner(), head.seq);
     assert!(watched.calls.into_inner() > 100, "whoever watches sees it move");
 
-    // With a snapshot, waking folds nothing.
+    // With a snapshot, waking the user folds nothing.
     keep_snapshot(&store, &diary.stream, &diary.session).unwrap();
     let again = rebuild(&domain, &store, &diary.stream, &Minds::default()).unwrap();
     assert_eq!(again.state_digest(), diary.session.state_digest());

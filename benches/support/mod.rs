@@ -1,4 +1,4 @@
-//! What the benchmarks share.
+//! Shared parts of the benchmarks.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use apprentice::learning::Lesson;
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Domain, Stage};
 
-/// `count` lessons with distinct utterances of our own, each for one of four programs.
+/// `count` lessons with different utterances of our own, each for one of four programs.
 pub fn lessons(domain: &Household, count: usize) -> Vec<Lesson<Scene, Task>> {
     let wash = "GOTO SinkBasin; PUT Mug SinkBasin; TOGGLE Faucet; TOGGLE Faucet; PICKUP Mug";
     let chill = "GOTO Fridge; OPEN Fridge; PUT Mug Fridge; CLOSE Fridge; OPEN Fridge; PICKUP Mug";

@@ -1,12 +1,13 @@
-//! The museum: the former form of everything that a release ever wrote and a later one writes
-//! differently, and the one-way doors out of them.
+//! Former formats of everything that a release wrote and a later release writes differently, and
+//! conversions to the next format.
 //!
-//! - [`records`]: bodies of events, read through types. Records are never rewritten.
-//! - [`layouts`]: data directories, which are brought up by copying.
+//! - [`records`]: bodies of events. Types read them; records are never rewritten.
+//! - [`layouts`]: data directories, which are upgraded by copying.
 //!
-//! An exhibit never changes once released: it imports nothing that lives, so nothing that lives can
-//! move it along. Each door is total, from one form to the next; the last step, into a living type,
-//! stands in `apprentice` beside that type. `docs/upgrading.md` says how a form is added.
+//! A released format never changes. This crate imports nothing from the other crates, so a change
+//! there cannot change it. Each conversion is total, from one format to the next. The last one, to
+//! a type of today, is in `apprentice` next to that type. `docs/upgrading.md` says how to add a
+//! format.
 
 pub mod layouts;
 pub mod records;

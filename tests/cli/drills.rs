@@ -1,4 +1,5 @@
-//! The service under a fault plan, run by a supervisor as an operator would, and stopped in order.
+//! The service with a fault plan, run by a supervisor as an operator would run it, and stopped in
+//! order.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -16,7 +17,7 @@ use apprentice::world::Stage;
 
 const PEOPLE: [&str; 3] = ["ada", "grace", "edsger"];
 const SAYINGS: usize = 40;
-/// Each life of the process ends after some thirty appends.
+/// Each process ends after about thirty appends.
 const PLAN: &str = "\
 seed = 3
 refused = 40
@@ -44,7 +45,7 @@ fn ready(service: &mut Child) {
     assert!(line.starts_with("serving at "), "{line:?}");
 }
 
-/// Asks with one request id until there is an answer, whatever dies in between.
+/// Asks with one request id until there is an answer, even if the process dies meanwhile.
 fn insist(client: &Client, command: &Command) {
     let id = fresh_id();
     for _ in 0..400 {

@@ -1,4 +1,4 @@
-//! The program as people start it. See `tests/README.md`.
+//! The program as a user starts it. See `tests/README.md`.
 
 mod drills;
 mod past;

@@ -1,5 +1,5 @@
-//! `replay` and `audit` as people start them: what they print, how they end, and that the
-//! directory stays as it is.
+//! `replay` and `audit` as a user starts them: what they print, and their exit codes. They do not
+//! change the directory.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,7 +18,7 @@ use apprentice_testkit::diary::Diary;
 use apprentice_testkit::ran::run;
 use apprentice_testkit::released::released;
 
-/// Runs and insists on code 0 and silence on standard error.
+/// Runs the program. It must end with code 0 and print nothing on standard error.
 #[track_caller]
 fn fine(arguments: &[&str]) -> String {
     let ran = run(arguments, "");
@@ -41,7 +41,7 @@ fn contents(dir: &Path) -> BTreeMap<PathBuf, Digest> {
     files
 }
 
-/// A directory in which ada taught one lesson, used it, took it back and went on.
+/// A directory in which ada taught one lesson, used it, took it back and continued.
 fn taught() -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data").display().to_string();
@@ -95,7 +95,7 @@ fn a_history_is_replayed_at_any_record_audited_and_left_alone() {
         assert!(!text.contains(time), "{time} in\n{text}");
     }
 
-    // The transcript plays, and comes out the same.
+    // The transcript can be played, with the same answers.
     let transcript = replay(&["--transcript"]);
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(transcript.as_bytes()).unwrap();
@@ -103,7 +103,7 @@ fn a_history_is_replayed_at_any_record_audited_and_left_alone() {
     assert_eq!(checked, "", "{transcript}");
     assert!(transcript.contains("forget \"boogie\""), "{transcript}");
     assert!(transcript.contains("teach \"boogie\" := nothing"), "{transcript}");
-    // And a wrong answer in it is seen.
+    // And a wrong answer in it is found.
     fs::write(file.path(), transcript.replacen("= GOTO Fridge", "= GOTO Mug", 1)).unwrap();
     assert_eq!(run(&["transcript", "check", &file.path().display().to_string()], "").code, Some(1));
 
@@ -169,13 +169,13 @@ fn a_doctored_directory_is_named_by_its_first_difference_and_code_1() {
     assert_eq!((ran.code, ran.err.as_str()), (Some(1), ""));
     assert!(ran.out.contains(&named), "{named}\nis missing in\n{}", ran.out);
     assert!(ran.out.contains("differences in 1 stream"), "{}", ran.out);
-    // Replay cannot give that mind either, and says which it gets.
+    // Replay cannot make that mind either, and says which one it makes.
     let ran = run(&["replay", "--data", &data, "--user", "ada"], "");
     assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""));
     assert!(ran.err.contains(&wrong.to_string()), "{}", ran.err);
 }
 
-/// Code 2, nothing on standard output, one sentence with these parts, nothing changed on disk.
+/// Code 2, nothing on standard output, one sentence with these parts, and no change on the disk.
 #[track_caller]
 fn refused(dir: &Path, arguments: &[&str], parts: &[&str]) {
     let before = contents(dir);
@@ -229,7 +229,7 @@ fn what_cannot_be_read_is_refused_in_one_sentence_and_left_alone() {
 #[test]
 fn records_that_were_acknowledged_and_are_lost_are_told_with_the_directory_that_lost_them() {
     let (folder, data) = taught();
-    // An older copy of the log under the newer heads, as after restoring half a backup.
+    // An older copy of the log with the newer heads, as after restoring half a backup.
     let old = folder.path().join("old");
     let older = Diary::new(
         &Arc::new(Household::new()),
@@ -251,9 +251,9 @@ fn records_that_were_acknowledged_and_are_lost_are_told_with_the_directory_that_
     assert!(ran.err.contains(&data) && ran.err.contains("lost"), "{}", ran.err);
 }
 
-/// `golden/shut-out-0.2/data.tar.gz` was made by a 0.2 before its release: ada began an episode whose
-/// goal held already, with a scene of her own, and said "hello". That ended the episode, "hello" was
-/// not among the utterances to teach, and no fold took the record.
+/// `golden/shut-out-0.2/data.tar.gz` was made by a 0.2 before its release. Ada began an episode
+/// with her own scene, in which the goal was already true, and said "hello". That ended the
+/// episode. "hello" was not among the utterances to teach, and no fold accepted the record.
 #[test]
 fn a_person_that_an_ending_of_0_2_shut_out_comes_back() {
     let folder = released("shut-out-0.2", "data");
@@ -271,7 +271,7 @@ fn a_person_that_an_ending_of_0_2_shut_out_comes_back() {
     fine(&[&replay[..], &["--transcript"]].concat());
     assert_eq!(contents(Path::new(&data)), before, "nothing changed on disk");
 
-    // What was said counts as unexplained: nothing explains it, and life goes on.
+    // "hello" counts as not explained, and ada can continue.
     let ran = run(&["--data", &data, "--user", "ada"], "none\n");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     assert!(ran.out.contains("hello"), "{}", ran.out);
@@ -299,7 +299,7 @@ fn an_ending_that_leaves_out_anything_else_is_still_a_difference() {
             ended.to_teach.clear();
         }
     });
-    // Saying done brings no goal about: no version left out what was said just before.
+    // `done` cannot reach a goal: no version left out the utterance before it.
     let stream = left_out.keys.stream_id(&TenantId::local(), &UserId::new("ada").unwrap()).unwrap();
     let error = rebuild(&domain, &left_out, &stream, &Minds::default()).err().unwrap();
     assert!(error.to_string().contains("utterances to teach"), "{error}");

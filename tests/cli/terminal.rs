@@ -1,5 +1,5 @@
-//! The binary as people start it: lines on standard input, answers on standard output, a code at
-//! the end.
+//! The binary as a user starts it: lines on standard input, answers on standard output, an exit
+//! code.
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Write};
@@ -62,7 +62,7 @@ fn run_bytes<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>, input: &[u
     let mut child = command(arguments).spawn().unwrap();
     let mut stdin = child.stdin.take().unwrap();
     let input = input.to_vec();
-    // A program that ends early closes its end: not a failure of the test.
+    // A program that ends early closes its input. The test does not fail for this.
     let writer = thread::spawn(move || stdin.write_all(&input).ok());
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
@@ -87,7 +87,7 @@ fn conversation(data: &Path, tasks: &[&str]) -> Vec<String> {
     arguments
 }
 
-/// A running conversation that is spoken to line by line, and killed without warning.
+/// A running conversation. The test writes it line by line and kills the program without warning.
 struct Live {
     child: Child,
     stdin: ChildStdin,
@@ -114,7 +114,7 @@ impl Live {
         self.lines.recv_timeout(PATIENCE).expect("the program says something")
     }
 
-    /// Says something and waits for the one line that answers it.
+    /// Says something and waits for the one line of the answer.
     #[track_caller]
     fn say(&mut self, line: &str) -> String {
         writeln!(self.stdin, "{line}").unwrap();
@@ -122,7 +122,7 @@ impl Live {
         self.heard()
     }
 
-    /// SIGKILL: the process gets no chance to put anything in order.
+    /// SIGKILL: the process cannot do anything before it ends.
     fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -135,7 +135,7 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (folder, data)
 }
 
-/// The washing that is taught, from the mug in the hand to the mug in the hand.
+/// The washing that is taught. The robot holds the mug at the beginning and at the end.
 const WASHING: &str = "go to the sink\nput the mug in the sink\nturn on the faucet\n\
      turn off the faucet\npick up the mug\n";
 
@@ -180,7 +180,7 @@ fn a_killed_conversation_goes_on_with_the_same_mind() {
     assert!(first.say("wash the coffee mug").starts_with("I don't understand"));
     first.kill();
 
-    // It goes on where it was, is killed while being taught, …
+    // It continues where it was, is killed while it is taught, …
     let mut second = Live::start(&arguments);
     assert!(second.heard().starts_with("Goal: wash a mug"));
     for line in WASHING.lines() {
@@ -205,7 +205,7 @@ fn a_killed_conversation_goes_on_with_the_same_mind() {
     let learned = mind(&line);
     third.kill();
 
-    // … and still knows it, with the same mind to the bit.
+    // … and still knows the lesson, with the same mind, bit for bit.
     let ran = talk(&data, &[], ":status\n:known\n").ended(0);
     let line = ran.lines().into_iter().find(|line| line.contains("mind ")).unwrap();
     assert_eq!(mind(line), learned);
@@ -379,7 +379,7 @@ fn several_people_talk_to_one_service_at_once() {
         assert!(ran.out.contains("Learned. I now know 45 examples."), "{}", ran.out);
     }
     service.kill();
-    // With nobody there, the person hears it in a sentence.
+    // If no service is there, the person gets a sentence.
     let alone = run(["talk", "--connect", &endpoint], "").ended(1);
     assert!(alone.err.contains("no answer from"), "{}", alone.err);
 }
@@ -436,7 +436,7 @@ fn the_log_is_shown_for_people_and_for_programs() {
     assert_eq!(numbers, (1..=numbers.len() as u64).collect::<Vec<_>>());
     assert_eq!(records[0]["kind"], "SessionOpened");
     assert_eq!(records[2]["event"]["utterance"], "dance");
-    // Looking changes nothing.
+    // `:look` changes nothing.
     assert_eq!(run(show.into_iter().chain(["--json"]), "").ended(0).out, programs.out);
 
     run(["log", "show", "--data", data.to_str().unwrap(), "--user", "nobody"], "")

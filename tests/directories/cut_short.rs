@@ -1,5 +1,5 @@
-//! Long pieces of work by the real program, killed at any moment: bringing up a former layout, and
-//! salvaging. The next run makes good whatever was left half done.
+//! Long work of the real program, killed at any moment: an upgrade and a salvage. The next run
+//! completes it.
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn dice() -> SeededEntropy {
     SeededEntropy::new(seed())
 }
 
-/// A part of `whole`, drawn.
+/// A random part of `whole`.
 fn part_of(whole: Duration, dice: &SeededEntropy) -> Duration {
     let mut bytes = [0; 4];
     dice.fill(&mut bytes);
@@ -35,7 +35,7 @@ fn spawn(arguments: &[&str], dir: &Path, more: &[&Path]) -> Child {
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
-/// SIGKILL, unless it came to its end before.
+/// SIGKILL, unless it ended before.
 fn kill(child: &mut Child) {
     let _ = child.kill();
     child.wait().unwrap();
@@ -51,16 +51,16 @@ fn all_records(store: &Store) -> Vec<Vec<Record>> {
     let read = |stream: StreamId| {
         store.log.read(&stream, Seq::FIRST).unwrap().collect::<Result<_, _>>().unwrap()
     };
-    // What the service itself recorded since is no part of what was there.
+    // Records that the service itself added since do not count.
     streams.filter(|stream| !stream.is_tenants()).map(read).collect()
 }
 
 fn serve(dir: &Path) -> Child {
-    // On no port: what matters happens before anybody could connect.
+    // Without a port: what matters happens before a client could connect.
     spawn(&["serve", "--zmq", "tcp://127.0.0.1:0"], dir, &[])
 }
 
-/// Serves until the layout is the present one, and gives the time that it took.
+/// Serves until the layout is the present one. Returns the time that it took.
 fn bring_up(dir: &Path) -> Duration {
     let began = Instant::now();
     let mut child = serve(dir);
@@ -73,8 +73,8 @@ fn bring_up(dir: &Path) -> Duration {
     took
 }
 
-/// Opens what a kill left, as whoever starts a service again does: a child that the dead process had
-/// just forked holds its lock until it has become the program that it is to be.
+/// Opens what a kill left, as a second start of the service does. A child that the dead process had
+/// just forked holds its lock until it runs its own program.
 fn open_again(dir: &Path) -> Store {
     let began = Instant::now();
     loop {
@@ -113,7 +113,7 @@ fn bringing_up_a_former_layout_survives_a_kill_at_any_moment() {
     assert!(before > 0, "every kill came too late to show anything");
 }
 
-/// A closed directory with enough in it that copying it takes a while.
+/// A closed directory that is large enough for copying it to take a while.
 fn large(dir: &Path) -> Vec<Vec<Record>> {
     let store = store::open(dir).unwrap();
     let long = "words ".repeat(600);

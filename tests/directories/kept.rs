@@ -1,7 +1,8 @@
-//! A data directory that release 0.2 wrote is opened for ever: two labs and the single user's tenant,
-//! people under every recipe that shipped, lessons, a forgotten one, an erased person, retired and
-//! replaced keys, closed segments. `tools/keep_directory.py` recorded it with the binary of that
-//! release; `golden/released-0.2/digests.txt` is what that binary replayed it to.
+//! Every later release opens this data directory, which release 0.2 wrote. It has two labs and the
+//! single user's tenant, people with every recipe that shipped, lessons, a forgotten lesson, an
+//! erased person, retired and replaced keys, and closed segments. `tools/keep_directory.py`
+//! recorded it with the binary of that release. `golden/released-0.2/digests.txt` has the digests
+//! to which that binary replayed it.
 
 use std::fs;
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use apprentice_testkit::released::{golden, released};
 
 const RELEASE: &str = "released-0.2";
 
-/// A person, and what release 0.2 replayed them to.
+/// A person, and the digests to which release 0.2 replayed them.
 struct Kept {
     tenant: TenantId,
     user: UserId,

@@ -1,5 +1,5 @@
-//! Salvage, export and import of directories with several labs: what they say they kept is what the
-//! database holds, record by record, of every lab. `APPRENTICE_SEED` repeats a run.
+//! Salvage, export and import of directories with several labs. What they say they kept is what the
+//! database contains, record by record, for every lab. `APPRENTICE_SEED` repeats a run.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,10 +21,10 @@ use apprentice_testkit::diary::Diary;
 use apprentice_testkit::toy::{self, Bells};
 use apprentice_testkit::tree::copy_tree;
 
-/// Every stream's framed records, sealed as they stand.
+/// The framed records of every stream, sealed.
 type Everything = BTreeMap<StreamId, Vec<Vec<u8>>>;
 
-/// In memory where there is such a place: each record is synced.
+/// In memory if possible, because each record is synced.
 fn room() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     match memory.is_dir() {
@@ -42,7 +42,7 @@ fn frames(store: &Store, who: &StreamId) -> Vec<Vec<u8>> {
     sealed.map(|record| record.unwrap().frame).collect()
 }
 
-/// What the database holds.
+/// What the database contains.
 fn everything(dir: &Path) -> Everything {
     let store = open(dir).unwrap();
     let streams = streams_of(&store, None).unwrap();
@@ -66,7 +66,7 @@ fn share(all: &Everything, tenant: &TenantId) -> Share {
     share
 }
 
-/// Goes on where the directory stands: the service starts in it, and an audit finds no difference.
+/// The service starts in the directory, and an audit finds no difference.
 fn starts_and_audits(dir: &Path) {
     Service::start(toy::config(Data::Directory(dir.to_owned()))).unwrap().stop().unwrap();
     let store = open(dir).unwrap();
@@ -76,7 +76,7 @@ fn starts_and_audits(dir: &Path) {
     assert!(differences.is_empty(), "{differences:?}");
 }
 
-/// Salvage, and export and import of each lab, of a directory that nothing is wrong with: all of it.
+/// Salvage, and export and import of each lab, of an undamaged directory: everything is kept.
 fn check_whole(dir: &Path) -> Everything {
     let parent = room();
     let all = everything(dir);
@@ -96,7 +96,7 @@ fn check_whole(dir: &Path) -> Everything {
     assert!(everything(&out) == all, "the salvage holds something else");
     starts_and_audits(&out);
 
-    // One after the other into one directory, which then holds what the first one held.
+    // One after the other into one directory, which then contains what the first one contained.
     let moved = parent.path().join("moved");
     for tenant in &tenants {
         let file = parent.path().join(format!("{tenant}.apx"));
@@ -128,7 +128,7 @@ fn quotas(awake: u32) -> Order {
     Order::SetQuotas(Quotas { awake_users: Some(awake), ..Quotas::default() })
 }
 
-/// A person with an episode that ended and one under way.
+/// A person with an episode that ended and one that is under way.
 fn live(store: &Store, tenant: &TenantId, user: &str) -> StreamId {
     let tiny = Recipe::builtin("tiny").unwrap();
     let mut diary = Diary::new_in(&Arc::new(Bells::new()), store, tenant, user, tiny);
@@ -140,7 +140,7 @@ fn live(store: &Store, tenant: &TenantId, user: &str) -> StreamId {
     diary.stream
 }
 
-/// The directory's labs with an open tenant registry.
+/// The labs of the directory, with an open tenant registry.
 fn begun(dir: &Path, names: &[&str]) -> (Store, TenantRegistry) {
     let store = open(dir).unwrap();
     let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
@@ -207,8 +207,8 @@ fn a_thousand_own_records_beside_two_are_kept_and_the_two_as_well() {
     assert_eq!(all.values().map(Vec::len).collect::<Vec<_>>(), [1_000, 2]);
 }
 
-/// Three labs, two of which share a secret, so that one name gives one stream key in both. Records of
-/// many chunks, of the same lengths and under the same keys.
+/// Three labs, of which two share a secret. So one name gives one stream key in both. The records
+/// have many chunks, the same lengths and the same keys.
 fn twins(dir: &Path) {
     let (store, tenant_registry) = begun(dir, &["one", "other"]);
     drop((store, tenant_registry));
@@ -228,7 +228,7 @@ fn twins(dir: &Path) {
     assert_eq!(one, two);
 }
 
-/// What a salvage of `dir` says, and what its result holds once missing secrets are put back.
+/// What a salvage of `dir` says, and what its result contains after missing secrets are restored.
 fn salvaged(dir: &Path, secrets: &[(&Path, &str)]) -> (store::Salvaged, Everything) {
     let parent = room();
     let out = parent.path().join("rescued");
@@ -252,7 +252,7 @@ fn records_of_many_chunks_under_one_key_are_not_mixed() {
         let expected = of(&all, &lab(name)).values().map(Vec::len).sum::<usize>();
         assert_eq!(exported.records, expected as u64, "{name}");
     }
-    // Nothing but the records themselves says where they belong.
+    // Only the records themselves say where they belong.
     fs::remove_file(dir.path().join("HEADS")).unwrap();
     let (said, found) = salvaged(dir.path(), &[]);
     assert!(!said.is_complete() && said.unclaimed == 0 && found == all, "{:?}", said.by_tenant());
@@ -271,7 +271,7 @@ fn a_lab_whose_secrets_are_elsewhere_is_kept_sealed() {
     let shares = said.by_tenant();
     assert_eq!(shares[&lab("two")], Share { hurt: 2, ..share(&all, &lab("two")) });
     assert_eq!(shares[&lab("one")], share(&all, &lab("one")));
-    // Without heads, too: the tree in which they stand has the lab's name.
+    // The same without heads: the tree that contains them has the lab's name.
     fs::remove_file(dir.path().join("HEADS")).unwrap();
     let (said, found) = salvaged(dir.path(), &[(&elsewhere, "two.key")]);
     assert!(found == all && said.unclaimed == 0, "{:?}", said.by_tenant());
@@ -314,8 +314,8 @@ fn the_command_says_of_every_lab_what_was_kept_and_lost() {
     assert_eq!(run.status.code(), Some(1), "{said}");
 }
 
-/// A directory of one to five labs as the dice will: people, erasures, keys that were retired, labs
-/// that are disabled, segments and checkpoints, and several openings.
+/// A random directory of one to five labs: people, erasures, retired keys, disabled labs, segments
+/// and checkpoints, and several openings.
 fn any_directory(dir: &Path, dice: &SeededEntropy) {
     let count = 1 + below(dice, 5);
     let names = &["local", "mug-lab", "fridge-lab", "a", "z-9"][..count];
@@ -377,7 +377,7 @@ fn of_any_directory_salvage_and_export_keep_exactly_what_the_database_holds() {
     }
 }
 
-/// No lab gets another's record, and nothing is lost without a word, whatever is wrong.
+/// In any damaged directory no lab gets another lab's record, and every loss is reported.
 #[test]
 fn of_a_damaged_directory_every_lab_keeps_a_prefix_of_its_own_and_is_told_what_it_lost() {
     let dice = SeededEntropy::new(seed());
@@ -434,7 +434,7 @@ fn of_a_damaged_directory_every_lab_keeps_a_prefix_of_its_own_and_is_told_what_i
     assert!(kept * 10 > whole * 8, "{kept} of {whole}");
 }
 
-/// An erased person's head stays what it was.
+/// The head of an erased person does not change.
 #[test]
 fn an_erased_person_of_labs_with_one_secret_is_kept_by_the_head() {
     let dir = room();

@@ -1,4 +1,4 @@
-//! Data directories in trouble: damaged, cut short, moved, written by earlier releases. Runs the
+//! Data directories that are damaged, incomplete, moved, or written by earlier releases. Runs the
 //! program; see `tests/README.md`.
 
 mod cut_short;

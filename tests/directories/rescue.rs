@@ -1,5 +1,5 @@
-//! Getting people's records out of trouble: salvage from a damaged directory, and moving a tenant to
-//! another one.
+//! Saving people's records: salvage from a damaged directory, and moving a tenant to another
+//! directory.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -39,14 +39,14 @@ fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// Everybody's records in every tenant named.
+/// The records of all people in every named tenant.
 fn everything(store: &Store, tenants: &[&str]) -> BTreeMap<StreamId, Vec<Record>> {
     let tenants = tenants.iter().map(|name| TenantId::new(name).unwrap());
     let streams = tenants.flat_map(|tenant| store.log.streams(&tenant).unwrap());
     streams.map(|who| (who.clone(), read_all(&*store.log, &who))).collect()
 }
 
-/// Appends to random people, now and then a record far above a page's size.
+/// Appends to random people. Some records are much larger than a page.
 fn live(store: &Store, dice: &SeededEntropy, appends: usize) {
     for _ in 0..appends {
         let tenant = ["local", "lab"][below(dice, 2)];
@@ -72,7 +72,7 @@ fn salvage_finds_every_record_that_the_database_finds() {
     drop(open(&dir).unwrap());
     let beside = ["keys/server.curve", "checkpoints/ORIGIN", "checkpoints/lab"];
     beside.iter().for_each(|name| fs::write(dir.join(name), name).unwrap());
-    // Old pages, half-filled segments, many openings: the file as it looks after a while.
+    // Old pages, half-filled segments, many openings: the file as it is after some time.
     for round in 0..6 {
         live(&open(&dir).unwrap(), &dice, 120);
         let out = parent.path().join(format!("rescued {round}"));
@@ -93,7 +93,7 @@ fn salvage_of_a_directory_whose_process_died_has_all_that_was_acknowledged() {
     let store = open(&dir).unwrap();
     live(&store, &dice, 200);
     let expected = everything(&store, &["local", "lab"]);
-    // The files as they stand: what a kill would leave.
+    // The files as a kill would leave them.
     copy_tree(&dir, &dead);
     drop(store);
     let salvaged = store::salvage(&dead, &parent.path().join("rescued")).unwrap();
@@ -140,7 +140,7 @@ fn salvage_lists_what_was_lost_and_keeps_each_prefix() {
         kept += found.len();
     }
     assert!(kept > 0 && kept < expected.values().map(Vec::len).sum());
-    // The rescued directory is a whole one: life goes on in it.
+    // The salvaged directory is complete and can be used.
     live(&rescued, &SeededEntropy::new(4), 20);
     drop(rescued);
     let again = program(["salvage", "--data", text(&dir), "--out", text(&out)]).output().unwrap();
@@ -177,7 +177,7 @@ fn salvage_that_was_killed_leaves_nothing_that_looks_whole_and_can_be_repeated()
         let mut child = salvage().spawn().unwrap();
         kill_once(&mut child, &unfinished.join(place));
         if out.exists() {
-            // It was too quick for us: then it is whole.
+            // The process ended before the kill. Then the result is complete.
             assert_eq!(everything(&open(&out).unwrap(), &["local", "lab"]), expected);
             fs::remove_dir_all(&out).unwrap();
         }
@@ -209,7 +209,7 @@ fn a_person_who_moves_with_the_tenant_is_rebuilt_with_the_same_state_and_mind() 
     assert_eq!(exported.people, 1);
     let key = store::key_file_of(&file);
     store::import(&at("fresh"), &file, &key).unwrap();
-    // A directory in which another lab lives already.
+    // A directory that already contains another lab.
     let other = open(&at("other")).unwrap();
     let eve = stream(&other.keys, "lab", "eve");
     other.log.append(&eve, Head::EMPTY, batch(["here first"])).wait().unwrap();
@@ -229,7 +229,7 @@ fn a_person_who_moves_with_the_tenant_is_rebuilt_with_the_same_state_and_mind() 
     assert_eq!(rebuilt(&at("other")), before);
     assert_eq!(read_all(&*open(&at("other")).unwrap().log, &eve).len(), 1);
 
-    // What was taught is known at the new place.
+    // What was taught is known in the new directory.
     let service = Service::start(toy::config(Data::Directory(at("fresh")))).unwrap();
     let robot = service.connect(UserId::new("ada").unwrap()).unwrap();
     robot.start(Stage::Task { task: "Glass".to_owned(), seed: 1 }).unwrap();

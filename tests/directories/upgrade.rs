@@ -1,7 +1,7 @@
-//! A data directory that the previous release wrote, byte for byte, opens, means what it meant, and
-//! goes on. `golden/released-0.1/data.tar.gz` was made by the binary of 0.1: ada talked in three
-//! episodes, taught twice and took one lesson back; bob, with the recipe `paper`, is asked what his
-//! words meant. What `apprentice log show` of that binary printed stands beside it.
+//! A data directory that the previous release wrote opens, means the same as before, and can be
+//! used. The binary of 0.1 made `golden/released-0.1/data.tar.gz`: ada talked in three episodes,
+//! taught twice and took one lesson back; bob, with the recipe `paper`, has something to teach. The
+//! folder also has the output of that binary's `apprentice log show`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ fn records(store: &Store, user: &str) -> Vec<Record> {
     records.collect::<Result<_, _>>().unwrap()
 }
 
-/// Holds what a directory rebuilds to against the pins.
+/// Compares the rebuilt state of a directory with the pins.
 fn check_sessions(store: &Store, minds: &Minds) {
     for (user, phase) in [("ada", Phase::Interacting), ("bob", Phase::Teaching)] {
         let household = Arc::new(Household::new());
@@ -51,7 +51,7 @@ fn a_directory_of_the_previous_release_opens_and_rebuilds_to_what_it_was() {
     assert_eq!(layout(dir.path()), "apprentice data directory, layout 2\n");
     let minds = Minds::default();
     check_sessions(&store, &minds);
-    // Her kept mind came along, of unknown origin; nobody ever kept bob's base mind.
+    // Her kept mind was copied; it is not known which code made it. Bob's base mind was never kept.
     let counts = store.models.counts();
     assert_eq!(counts, CacheCounts { stale: 1, absent: 1, ..CacheCounts::default() });
     let work = minds.work();
@@ -61,7 +61,7 @@ fn a_directory_of_the_previous_release_opens_and_rebuilds_to_what_it_was() {
             assert_eq!(event.code, None, "record {} is of version 1", record.seq);
         }
     }
-    // Brought up once; after that everything fits.
+    // It is upgraded once. After that everything fits.
     drop(store);
     let store = open(dir.path()).unwrap();
     let minds = Minds::default();
@@ -131,7 +131,7 @@ fn people_go_on_where_they_were_and_old_and_new_records_make_one_chain() {
     bob.wait_until_learned(Duration::from_secs(120)).unwrap();
     let wakings = service.wakings();
     assert_eq!((wakings.work.rebuilds, wakings.work.events_folded), (1, then.len() as u64));
-    // He is on `paper` and the service on `default`: his base mind was trained for him.
+    // He uses `paper` and the service `default`, so his base mind was trained for him.
     assert_eq!((wakings.work.trainings, wakings.snapshots.absent), (1, 1));
     service.stop().unwrap();
 
@@ -145,7 +145,7 @@ fn people_go_on_where_they_were_and_old_and_new_records_make_one_chain() {
     check_ada(&store);
 }
 
-/// Somebody who did not come back since is still as she was.
+/// A person who did not come back since has the same state.
 fn check_ada(store: &Store) {
     let household = Arc::new(Household::new());
     let session = rebuild(&household, store, &stream(store, "ada"), &Minds::default()).unwrap();

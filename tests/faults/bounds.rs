@@ -1,5 +1,5 @@
-//! Every queue is bounded, and at the bound there is an honest Busy: nothing is dropped, and
-//! nothing waits for ever. A service that has failed does not wait for anything either.
+//! Every queue is bounded. At the bound the answer is Busy: nothing is dropped, and nothing waits
+//! without end. A service that has failed does not wait for anything either.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,8 +15,8 @@ use apprentice::world::Stage;
 
 use apprentice_testkit::toy::{self, Bells, Gate};
 
-/// Some sockets that speak for many people. Each has fewer answers under way than the service keeps
-/// for a peer that does not read.
+/// A few sockets that speak for many people. Each has fewer answers under way than the service
+/// keeps for a client that does not read.
 struct Crowd(Vec<zmq::Socket>);
 
 const SOCKETS: usize = 16;
@@ -49,7 +49,7 @@ impl Crowd {
         decode_response(&self.0[first].recv_bytes(0).unwrap()).unwrap()
     }
 
-    /// Everybody asks the same, again while it is too much at once; who is refused is a failure.
+    /// Everybody asks the same, and asks again while the service is busy. A refusal is a failure.
     fn all_ask(&self, people: usize, ask: &Ask) -> Vec<Response> {
         let mut open: BTreeMap<RequestId, usize> = BTreeMap::new();
         let (mut answers, mut next) = (Vec::new(), 0);
@@ -66,7 +66,7 @@ impl Crowd {
                     panic!("{refusal:?}")
                 }
                 (id, answer) => {
-                    // Late answers to waiters are nobody's any more.
+                    // Late answers to requests that were given up; nobody waits for them.
                     answers.extend(open.remove(&id).map(|_| answer));
                 }
             }
@@ -109,7 +109,7 @@ fn phases(answers: &[Response]) -> Vec<Phase> {
 
 #[test]
 fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
-    // More trainings than the trainers' queue holds, while none comes to its end.
+    // More trainings than the trainers' queue can take, while none of them ends.
     let gate = Arc::<Gate>::default();
     let service = service(&gate, None);
     let crowd = Crowd::new(&service);
@@ -118,7 +118,7 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
     let status = Ask::Person(PersonAsk::Query(Query::Status));
     assert!(phases(&crowd.all_ask(people, &status)).iter().all(|&p| p == Phase::Learning));
 
-    // More waiters than one person may have, and more requests than the gateway has in hand.
+    // More waiters than one person may have, and more requests than the gateway accepts.
     let wait = Ask::Person(PersonAsk::Wait { seconds: WAIT_S_MAX });
     let waits = people * WAITERS_MAX + 1;
     assert!(waits > GATEWAY_IN_FLIGHT_MAX);
@@ -133,7 +133,7 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
     }
     assert!(service.counts().busy > 0, "the gateway itself turned some away");
 
-    // Nobody was dropped, and those whom the queue had no place for get theirs.
+    // Nobody was dropped. Those for whom the queue had no space get their answer too.
     gate.open();
     for _ in 0..waits - busy {
         let (_, answer) = crowd.hear();
@@ -151,8 +151,8 @@ fn at_every_bound_there_is_an_honest_busy_and_everybody_is_served_in_the_end() {
 #[test]
 fn a_failed_service_does_not_wait_for_a_training() {
     let gate = Arc::<Gate>::default();
-    // Two people need seven appends each until they are learning, and their tenant some for the
-    // segments that their episodes close; who begins then brings on the end.
+    // Until they learn, two people need seven appends each, and their tenant needs some for the
+    // segments that their episodes close. The next append fails.
     let mut script = vec![Fault::None; 24];
     script.push(Fault::CrashAfter);
     let service = service(&gate, Some(FaultPlan { script, ..FaultPlan::default() }));

@@ -1,5 +1,5 @@
-//! The real thing killed: SIGKILL at random moments, while it starts, under load, and while minds
-//! are being trained.
+//! The real program killed: SIGKILL at random moments, while it starts, under load, and while minds
+//! are trained.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -61,8 +61,8 @@ impl Place {
         self.folder.path().join("socket")
     }
 
-    /// Holds a copy of the directory, as the kill left it, against the ledgers: what reads it here
-    /// must not tidy it up for the next start.
+    /// Compares a copy of the directory, as the kill left it, with the ledgers. It is a copy,
+    /// because reading must not repair the directory before the next start.
     fn check(&self) -> Vec<Found> {
         if !self.data().exists() {
             return vec![Found::default(); self.people.len()];
@@ -85,7 +85,7 @@ fn check(store: &Store, ledger: &Ledger) -> Found {
     ledger.check(store, &ledger.acknowledged()).unwrap_or_else(|sentence| panic!("{sentence}"))
 }
 
-/// Kills a service so many times and panics when it has broken a promise.
+/// Kills a service a number of times. Panics if it has broken a promise.
 pub fn run(kills: usize, seed: u64) -> Counts {
     let (mut dice, mut counts) = (Dice::new(seed), Counts::default());
     let mut place = Place::new();
@@ -120,7 +120,7 @@ pub fn run(kills: usize, seed: u64) -> Counts {
     counts
 }
 
-/// Starts the service, lets people insist on what they know and live on, and kills it.
+/// Starts the service, lets people repeat their requests and continue, and kills it.
 fn kill_once(place: &Place, moment: Moment, dice: &mut Dice) -> Vec<Insisted> {
     let mut server = Server::spawn(&place.data(), &place.socket(), &[]);
     if moment == Moment::Starting {
@@ -174,7 +174,7 @@ pub fn wait_while(condition: impl Fn() -> bool, limit: Duration) {
     }
 }
 
-/// Starts it once more and lets everybody find everything again, with nothing left under way.
+/// Starts it once more. Everybody finds everything again, and no work is left.
 fn settle(place: &Place, dice: &mut Dice) {
     let server = Server::start(&place.data(), &place.socket());
     let signals = Signals::default();
@@ -185,7 +185,7 @@ fn settle(place: &Place, dice: &mut Dice) {
     server.kill();
 }
 
-/// `apprentice log show` prints what the store holds: every record, in order.
+/// `apprentice log show` prints what the store contains: every record, in order.
 fn shown_by_the_log_command(place: &Place) {
     let store = store::copy_private(&place.data()).unwrap();
     let store = store.open().unwrap();

@@ -1,5 +1,6 @@
-//! The disk full, and the disk failing: every write and every sync of one small life fails in
-//! turn, in a child process whose C library is asked through `shim.c`.
+//! The disk full, and the disk failing. One short history is played once for each write and each
+//! sync, and that call fails. A child process plays it, and `shim.c` fails the calls of its C
+//! library.
 
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
@@ -33,24 +34,24 @@ pub struct Counts {
     pub failed: usize,
     pub at_start: usize,
     pub under_way: usize,
-    /// Of those, the log hung and the watch ended it.
+    /// Of these, the cases in which the log hung and the watch ended it.
     pub hung: usize,
-    /// One person got an honest error, everybody else would have gone on.
+    /// One person got an error, and everybody else could have continued.
     pub refused: usize,
-    /// The call belonged to a cache, or was made again with success: nobody noticed.
+    /// The call belonged to a cache, or was repeated with success: no client noticed.
     pub harmless: usize,
-    /// The life was over before that call: background work differs from run to run.
+    /// The history was over before that call: background work differs from run to run.
     pub not_reached: usize,
     pub acknowledged: usize,
 }
 
-/// Commands of the small life; it begins with a person whom nobody knows and has a training.
+/// Commands of the short history. It begins with a new person and has a training.
 const STEPS: usize = 12;
-/// How long a service that cannot go on may take to be gone.
+/// How long a service that cannot continue may take to end.
 const GONE: Duration = Duration::from_secs(4);
-/// Nobody waits longer than this for an answer.
+/// No test waits longer than this for an answer.
 const HANGS: Duration = Duration::from_secs(2 * COMMIT_S_MAX);
-/// As long as [`GONE`], after a life in which nobody was told of any trouble.
+/// The same as [`GONE`], after a history in which no client was told of any trouble.
 const SOON: Duration = Duration::from_millis(50);
 
 /// The shim, compiled once.
@@ -81,7 +82,7 @@ pub fn environment(folder: &Path, kind: &str, at: usize) -> Vec<(&'static str, S
     ]
 }
 
-/// How many writes and syncs the small life has when nothing fails.
+/// How many writes and syncs the short history has when nothing fails.
 pub fn calls() -> (usize, usize) {
     let folder = tempfile::tempdir().unwrap();
     let ledger = Ledger::new("ada");
@@ -92,7 +93,7 @@ pub fn calls() -> (usize, usize) {
     (writes.parse().unwrap(), syncs.parse().unwrap())
 }
 
-/// Lets the call of each index fail, one life each; panics at the end when one broke a promise.
+/// Fails the call of each index, one history each. Panics at the end if one broke a promise.
 pub fn fail_each(kind: Kind, calls: usize) -> Counts {
     let (next, counts) = (AtomicUsize::new(1), Mutex::new(Counts::default()));
     let broken = AtomicUsize::new(0);
@@ -105,7 +106,8 @@ pub fn fail_each(kind: Kind, calls: usize) -> Counts {
                     if at > calls {
                         break;
                     }
-                    // All are judged: what one call does wrong, others of its place do too.
+                    // All are checked before the test fails, because calls at similar places show
+                    // similar faults.
                     if catch_unwind(|| fail(kind, at, &counts)).is_err() {
                         broken.fetch_add(1, Ordering::SeqCst);
                     }
@@ -135,7 +137,7 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
             assert!(!path.contains("/cache/") || kind == Kind::Full, "{case}: {ended:?}");
             one_sentence(&case, ended);
         }
-        // Without a key nothing was written for this person; the log is as it was.
+        // Without a key nothing was written for this person. The log is unchanged.
         (Some(path), Ending::Refused(errors)) => {
             assert!(path.contains("/keys/"), "{case}: it answers {errors:?} and does not end");
             assert!(errors.iter().all(|error| error.contains("key")), "{case}: {errors:?}");
@@ -146,7 +148,7 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
         (None, ending) => assert!(matches!(ending, Ending::Whole), "{case}: {ending:?}"),
     }
 
-    // There is room again: everything acknowledged is there, and life goes on.
+    // There is space again: everything acknowledged is there, and the service works.
     let promised = ledger.acknowledged();
     let (data, socket) = (folder.path().join("data"), folder.path().join("socket"));
     let opened = store::open(&data).unwrap_or_else(|error| panic!("{case}: {error}"));
@@ -173,13 +175,13 @@ fn fail(kind: Kind, at: usize, counts: &Mutex<Counts>) {
     counts.acknowledged += promised.len();
 }
 
-/// Whether nobody need notice a failure there: the making of a key is tried again before anything
-/// else is, and the tree is signed again when it has grown.
+/// True if a failure at this call may go unnoticed: making a key is tried again before anything else,
+/// and the tree is signed again when it has grown.
 fn may_pass(path: &str) -> bool {
     ["/cache/", "/keys/users", "/checkpoints"].iter().any(|part| path.contains(part))
 }
 
-/// Whoever runs it gets a code that is not 0 and one clear sentence, and no panic.
+/// The process gives a code other than 0 and one clear sentence, and does not panic.
 fn one_sentence(case: &str, ended: &Ended) {
     let code = ended.status.code();
     assert!(matches!(code, Some(1 | 2)), "{case}: {ended:?}");
@@ -190,18 +192,18 @@ fn one_sentence(case: &str, ended: &Ended) {
     assert!(!said[0].contains("panicked"), "{case}: {ended:?}");
 }
 
-/// How a small life ended.
+/// How a short history ended.
 #[derive(Debug)]
 enum Ending {
     /// All steps were answered.
     Whole,
-    /// The service goes on, and said why it could not carry something out.
+    /// The service continued, and said why it could not carry something out.
     Refused(Vec<String>),
     /// The service ended by itself.
     Gone(Ended),
 }
 
-/// The small life, always the same, over a directory that does not exist yet.
+/// The short history, always the same, on a directory that does not exist yet.
 fn live(folder: &Path, ledger: &Ledger, kind: &str, at: usize) -> Ending {
     let (data, socket) = (folder.join("data"), folder.join("socket"));
     let mut server = Server::spawn(&data, &socket, &environment(folder, kind, at));
@@ -223,11 +225,11 @@ fn live(folder: &Path, ledger: &Ledger, kind: &str, at: usize) -> Ending {
         signals.hang_up.store(true, Ordering::SeqCst);
         living.join().unwrap()
     });
-    // One that cannot go on has said so, or is on its way out; the last fault may also have hit
+    // A service that cannot continue has said so, or is about to end. The fault may also have come
     // after the last answer.
     let limit = if whole { SOON } else { GONE };
     let errors = signals.errors.into_inner().unwrap();
-    // A fault that hit after the last answer is still to be said; a busy machine takes longer for it.
+    // A fault after the last answer is reported only now. A busy machine takes longer for it.
     let ended = server.end(limit).or_else(|| {
         let hit = std::fs::read_to_string(folder.join("mark")).ok();
         let told = whole && kind != "count" && hit.is_some_and(|path| !may_pass(&path));

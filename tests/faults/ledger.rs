@@ -1,5 +1,5 @@
-//! What people asked and what they were answered, kept outside of the service, and how the store
-//! is held against it.
+//! What people asked and which answers they got, kept outside the service, and compared with the
+//! store.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -11,7 +11,7 @@ use apprentice::ids::{RequestId, Seq, TenantId, UserId};
 use apprentice::session::reply_of;
 use apprentice::store::Store;
 
-/// One command and what was heard of it.
+/// One command and its answer.
 #[derive(Clone)]
 pub struct Entry {
     pub id: RequestId,
@@ -23,20 +23,20 @@ pub struct Entry {
 pub enum Outcome {
     /// Nothing yet: it may be recorded or not.
     Open,
-    /// Acknowledged, with these bytes: it must never be taken back.
+    /// Acknowledged, with these bytes. Nothing may undo it.
     Reply { bytes: Vec<u8>, reply: Reply },
     /// Declined: nothing was recorded.
     Rejected,
 }
 
-/// One person's ledger, written by their thread and read by the judge.
+/// One person's ledger. The person's thread writes it, and the judge reads it.
 #[derive(Clone)]
 pub struct Ledger {
     pub user: UserId,
     entries: Arc<Mutex<Vec<Entry>>>,
 }
 
-/// What the store holds of one person.
+/// What the store contains of one person.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub struct Found {
     pub records: usize,
@@ -48,7 +48,7 @@ pub struct Found {
     pub learning: bool,
 }
 
-/// From this many bytes of JSON on, a scene surely has several chunks.
+/// A scene of this many bytes of JSON has several chunks.
 const LARGE_BYTES: usize = 12 * 1024;
 
 impl Ledger {
@@ -68,9 +68,9 @@ impl Ledger {
         acknowledged.map(|entry| entry.id).collect()
     }
 
-    /// Holds the records of a store against the ledger.
+    /// Compares the records of a store with the ledger.
     ///
-    /// - `promised`: the requests that must be there; others may be.
+    /// - `promised`: the requests that must be there. Others may be there too.
     /// - errors: a sentence about the first promise that was broken.
     pub fn check(&self, store: &Store, promised: &BTreeSet<RequestId>) -> Result<Found, String> {
         let say = |what: String| format!("{}: {what}", self.user.as_str());
@@ -78,7 +78,7 @@ impl Ledger {
         self.compare(&records, promised).map_err(say)
     }
 
-    /// The ledger of a world in which no more was recorded than this.
+    /// The ledger of a person of whom nothing more was recorded than this.
     pub fn as_of(&self, records: &[Record]) -> Ledger {
         let recorded: BTreeSet<RequestId> = records.iter().map(|record| record.request).collect();
         let mut entries = self.entries().clone();
@@ -162,7 +162,7 @@ impl Ledger {
     }
 }
 
-/// The judge is judged: what it is there to see, it sees.
+/// Tests the judge: it finds what it must find.
 mod tests {
     use apprentice::events::{Batch, RetrainScheduled, SessionClosed};
     use apprentice::ids::{Digest, Timestamp};

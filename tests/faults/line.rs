@@ -1,4 +1,4 @@
-//! A client that keeps every answer as the bytes that came, and hangs up when it is told to.
+//! A client that keeps the bytes of every answer, and disconnects when it is told to.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use crate::served::endpoint;
 pub struct Line<'a> {
     socket: zmq::Socket,
     user: UserId,
-    /// Hung up: nobody answers any more.
+    /// Disconnected: no answers come any more.
     stop: &'a AtomicBool,
 }
 
@@ -24,7 +24,7 @@ pub struct Heard {
     pub response: Response,
 }
 
-/// An answer that does not come is asked for again.
+/// Time after which a request without an answer is sent again.
 const AGAIN: Duration = Duration::from_secs(10);
 
 impl Line<'_> {
@@ -38,11 +38,11 @@ impl Line<'_> {
 
     /// Asks until there is an answer other than Busy, always with the same id.
     ///
-    /// - returns: none when the line was hung up.
+    /// - returns: none if the client was disconnected.
     pub fn ask(&self, id: RequestId, ask: &Ask) -> Option<Heard> {
         let bytes = encode_request(&Request { id, user: self.user.clone(), ask: ask.clone() });
         loop {
-            // A full pipe is one to nobody: the next attempt sends again.
+            // A full pipe has no receiver any more: the next attempt sends again.
             let _ = self.socket.send(&bytes, zmq::DONTWAIT);
             match self.answer(id, Instant::now() + AGAIN) {
                 Some(Heard { response: Response::Busy(busy), .. }) => {

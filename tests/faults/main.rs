@@ -1,6 +1,6 @@
-//! Faults of the real thing: the process killed, the power cut, the disk full or failing, a panic
-//! inside. Promises and figures stand in `docs/reliability.md`; `cargo xtask crash` and
-//! `cargo xtask powerloss` run as many rounds as wanted.
+//! Faults of the real program: the process killed, the power cut, the disk full or failing, a panic
+//! inside. `docs/reliability.md` has the promises and figures. `cargo xtask crash` and `cargo xtask
+//! powerloss` run any number of rounds.
 
 mod bounds;
 mod crash;
@@ -21,7 +21,7 @@ fn whenever_it_is_killed_every_acknowledgement_is_found_again() {
     let counts = crash::run(kills, seed());
     println!("{kills} kills: {counts:?}; acknowledgements lost: 0");
     if kills >= 50 {
-        // Each kind of trouble was there; otherwise the run has shown nothing.
+        // Each kind of trouble must have come; otherwise the run shows nothing.
         for (kind, count) in [
             ("kill while starting", counts.while_starting),
             ("kill while learning", counts.while_learning),
@@ -36,8 +36,8 @@ fn whenever_it_is_killed_every_acknowledgement_is_found_again() {
     }
 }
 
-/// Runs one of the ignored tests in a mount namespace of its own: whatever ends the process, the
-/// kernel unmounts what it mounted, and with the mounts go the loop devices.
+/// Runs one of the ignored tests in its own mount namespace. However the process ends, the kernel
+/// unmounts what it mounted, and this detaches the loop devices.
 fn in_a_namespace(test: &str) {
     if let Err(reason) = power::able() {
         let ci = std::env::var("CI").is_ok_and(|value| value == "true");

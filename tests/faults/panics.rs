@@ -1,5 +1,5 @@
-//! Panics inside, one at a time. What one person's work brings down costs one answer; what
-//! everybody depends on stops the process at once, and nothing is lost either way.
+//! Panics inside, one at a time. A panic in one person's work costs one answer. A panic in a part
+//! that everybody depends on ends the process at once. Nothing acknowledged is lost.
 
 use std::sync::atomic::Ordering;
 use std::thread;
@@ -11,8 +11,8 @@ use crate::ledger::Ledger;
 use crate::people::{Person, Signals};
 use crate::served::{PATIENCE, Server};
 
-/// A dead service must be seen to be dead within this time: a second on a quiet machine, and far from
-/// the minute after which one that hangs is given up.
+/// A service that must end has to end within this time: a second on a quiet machine, and much less
+/// than the minute after which a hanging service is given up.
 const AT_ONCE: Duration = Duration::from_secs(10);
 const STEPS: usize = 25;
 
@@ -38,7 +38,7 @@ impl Place {
         server
     }
 
-    /// Everybody lives through some steps, or until the service has said that it cannot go on.
+    /// Everybody plays some steps, or until the service has said that it cannot continue.
     fn live(&self, server: &mut Server) -> Lived {
         let (socket, signals) = (self.folder.path().join("socket"), Signals::default());
         let ended = thread::scope(|scope| {
@@ -62,7 +62,7 @@ impl Place {
         Lived { ended, defects: signals.defects.load(Ordering::SeqCst) }
     }
 
-    /// After a restart everybody finds again what they had been told.
+    /// After a restart everybody finds what they had been told.
     fn all_is_there(&self) {
         let (data, socket) = (self.folder.path().join("data"), self.folder.path().join("socket"));
         let store = store::open(&data).unwrap();
@@ -93,7 +93,7 @@ fn a_panic_in_one_persons_work_costs_one_answer_at_most() {
         let lived = place.live(&mut server);
         assert!(lived.ended.is_none(), "{point}: {:?}", lived.ended);
         assert_eq!(lived.defects, defects, "{point}");
-        // The actor that was hit and all others go on.
+        // The affected actor and all others continue.
         let after = place.live(&mut server);
         assert!(after.ended.is_none(), "{point}: {:?}", after.ended);
         assert_eq!(after.defects, 0, "{point}");

@@ -1,5 +1,5 @@
-//! People under whose hands the service dies: they play episodes in small and large rooms, teach,
-//! forget, and after each restart insist on what they had been told.
+//! People whose service is killed while they use it. They play episodes in small and large rooms,
+//! teach and forget. After each restart they check that what they had been told is still true.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -19,15 +19,15 @@ use apprentice_testkit::dice::Dice;
 /// What the judge and the people tell each other.
 #[derive(Default)]
 pub struct Signals {
-    /// The service is dead or about to be: hang up.
+    /// The service is dead or about to die: disconnect.
     pub hang_up: AtomicBool,
-    /// People who have found everything again that they had been told.
+    /// How many people have found everything again that they had been told.
     pub satisfied: AtomicUsize,
     /// Acknowledgements that scheduled a training.
     pub learning: AtomicUsize,
     /// Answers that said that the service has a defect.
     pub defects: AtomicUsize,
-    /// What it said when it could not carry something out.
+    /// What the service said when it could not carry something out.
     pub errors: Mutex<Vec<String>>,
 }
 
@@ -38,16 +38,16 @@ pub struct Person<'a> {
     signals: &'a Signals,
 }
 
-/// What asking again brought to light.
+/// What the repeated requests showed.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Insisted {
     /// Replies that came again, byte for byte.
     pub again: usize,
-    /// Requests that were under way at the kill and are answered now.
+    /// Requests that were pending at the kill and are answered now.
     pub late: usize,
 }
 
-/// Old requests that are asked again after each restart, beside the latest.
+/// How many old requests are repeated after each restart, besides the latest.
 const OLD_ONES: usize = 6;
 const LATEST: usize = 6;
 
@@ -70,14 +70,14 @@ impl<'a> Person<'a> {
         Person { ledger, line, dice: Dice::new(seed), signals }
     }
 
-    /// Asks again: the latest requests and some old ones, acknowledged or not, and whatever
-    /// training was under way. Panics when an acknowledgement has changed.
+    /// Repeats requests: the latest and some old ones, acknowledged or not, and waits for a
+    /// training that was under way. Panics if an acknowledgement has changed.
     ///
-    /// - returns: none when the line was hung up.
+    /// - returns: none if the client was disconnected.
     pub fn insist(&mut self) -> Option<Insisted> {
         let mut insisted = Insisted::default();
         let count = self.ledger.entries().len();
-        // A service remembers so many requests of a person and no more.
+        // A service remembers only this many requests of a person.
         let oldest = count.saturating_sub(REQUEST_RING - 64);
         let latest = count.saturating_sub(LATEST).max(oldest);
         let mut again: Vec<usize> = (latest..count).collect();
@@ -113,7 +113,7 @@ impl<'a> Person<'a> {
         Some(insisted)
     }
 
-    /// A training that was under way when the service died comes to its end (`NoLostWork`).
+    /// A training that was under way when the service died ends (`NoLostWork`).
     fn wait_until_learned(&self) -> Option<Status> {
         loop {
             match self
@@ -125,21 +125,21 @@ impl<'a> Person<'a> {
                     return Some(waited.status);
                 }
                 Response::Waited(_) => {}
-                // The service says that it cannot go on.
+                // The service says that it cannot continue.
                 Response::Error(_) => return None,
                 other => panic!("{:?}: waiting brought {other:?}", self.ledger.user),
             }
         }
     }
 
-    /// Lives until the line is hung up.
+    /// Plays until the client is disconnected.
     pub fn live(&mut self) {
         while self.step().is_some() {}
     }
 
     /// One command that fits the phase.
     ///
-    /// - returns: none when the line was hung up, or the service said that it cannot go on.
+    /// - returns: none if the client was disconnected, or the service said that it cannot continue.
     pub fn step(&mut self) -> Option<()> {
         let status = self.wait_until_learned()?;
         let command = self.think(&status)?;
@@ -158,7 +158,7 @@ impl<'a> Person<'a> {
             self.signals.learning.fetch_add(1, Ordering::SeqCst);
         }
         if let (true, Command::Teach { explains, .. }) = (rejected, command) {
-            // The lesson clashes with a seed, or has no run of actions: nothing explains it.
+            // The lesson clashes with a seed, or has no run of actions. So it is declined.
             let command = Command::Teach { explains, actions: vec![], on_clash: OnClash::Ask };
             return self.record(command);
         }

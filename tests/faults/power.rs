@@ -1,5 +1,5 @@
-//! The power cut: a data directory on an ext4 file system whose image is copied in the middle of
-//! writing, without any sync. What only stands in the kernel's memory is not in the copy, as it
+//! The power cut: a data directory on an ext4 file system, whose image is copied while the service
+//! writes, without any sync. Data that is only in the kernel's memory is not in the copy, as it
 //! would not be on the disk.
 
 use std::collections::BTreeSet;
@@ -23,7 +23,7 @@ use apprentice_testkit::dice::Dice;
 const PEOPLE: usize = 4;
 /// Images of one file system; then a new one begins.
 const IMAGES_OF_ONE: usize = 5;
-/// Room enough for the life of one file system.
+/// Space for all images of one file system.
 const DISK_BYTES: u64 = 96 * 1024 * 1024;
 
 /// What a run has seen.
@@ -32,9 +32,9 @@ pub struct Counts {
     pub images: usize,
     /// Taken before the data directory was complete.
     pub early: usize,
-    /// Acknowledgements that the images had to hold, and held.
+    /// Acknowledgements that the images had to contain, and contained.
     pub promised: usize,
-    /// Records found, those beyond the promises included.
+    /// Records found, with those beyond the promises.
     pub records: usize,
     pub large_records: usize,
     pub minds: usize,
@@ -42,7 +42,7 @@ pub struct Counts {
     pub asked_again: usize,
 }
 
-/// Whether this machine can do it.
+/// True if this machine can run the test.
 ///
 /// - errors: what is missing.
 pub fn able() -> Result<(), String> {
@@ -64,8 +64,8 @@ pub fn able() -> Result<(), String> {
     Ok(())
 }
 
-/// An ext4 file system in a file, mounted. Unmounted when dropped; its loop device detaches itself
-/// with the last mount, and no other is touched.
+/// An ext4 file system in a file, mounted. It is unmounted when dropped. Its loop device detaches
+/// itself with the last mount; no other device is touched.
 struct Disk {
     image: PathBuf,
     at: PathBuf,
@@ -94,10 +94,10 @@ impl Drop for Disk {
     fn drop(&mut self) {
         let unmounted = Command::new("umount").arg(&self.at).status();
         if !unmounted.is_ok_and(|status| status.success()) {
-            // Still in use: it goes when its last user does.
+            // Still in use. It is unmounted when its last user ends.
             let _ = Command::new("umount").arg("--lazy").arg(&self.at).status();
         }
-        // Nothing is left in all usual cases; if so, it is ours, for it stands on our image.
+        // Usually nothing is left. If something is, it is on our image, so it is ours.
         let left = Command::new("losetup")
             .args(["--noheadings", "--output", "NAME", "--associated"])
             .arg(&self.image)
@@ -116,7 +116,7 @@ fn run(program: &str, arguments: &[&Path]) {
     assert!(output.status.success(), "{program} {arguments:?}: {}", said.trim());
 }
 
-/// Takes so many images and panics when one of them has broken a promise.
+/// Takes a number of images. Panics if one of them has broken a promise.
 pub fn cut(images: usize, seed: u64) -> Counts {
     let (mut dice, mut counts) = (Dice::new(seed), Counts::default());
     while counts.images < images {
@@ -131,7 +131,7 @@ pub fn cut(images: usize, seed: u64) -> Counts {
 
 /// Cuts the power of a service whose syncs do nothing.
 ///
-/// - returns: the first broken promise that was seen, if one was among so many images.
+/// - returns: the first broken promise, if one of the images showed one.
 pub fn cut_without_syncs(images: usize, seed: u64) -> Option<String> {
     let (mut dice, mut counts) = (Dice::new(seed), Counts::default());
     while counts.images < images {
@@ -144,7 +144,7 @@ pub fn cut_without_syncs(images: usize, seed: u64) -> Option<String> {
     None
 }
 
-/// Whether `fsync` and `fdatasync` of the service do what they say.
+/// True if `fsync` and `fdatasync` of the service work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Syncs {
     Honest,
@@ -152,8 +152,8 @@ enum Syncs {
 }
 
 fn one_disk(images: usize, syncs: Syncs, dice: &mut Dice, counts: &mut Counts) {
-    // In memory where there is such a place: what counts is what reached the image file, and not
-    // what that costs.
+    // In memory if possible: only the bytes that reached the image file count, not how long it
+    // took.
     let memory = Path::new("/dev/shm");
     let folder = match memory.is_dir() {
         true => tempfile::tempdir_in(memory),
@@ -162,7 +162,7 @@ fn one_disk(images: usize, syncs: Syncs, dice: &mut Dice, counts: &mut Counts) {
     let folder = folder.unwrap();
     let (image, copy) = (folder.path().join("disk"), folder.path().join("copy"));
     Disk::make(&image);
-    // `writeback` lets a file grow before its bytes are there, which other file systems do too.
+    // `writeback` lets a file grow before its bytes are on the disk. Other file systems do so too.
     let options = *dice.of(&["data=ordered", "data=ordered", "data=writeback"]);
     let mounted = Disk::mount(&image, &folder.path().join("mounted"), options);
     let socket = folder.path().join("socket");
@@ -199,10 +199,10 @@ fn one_disk(images: usize, syncs: Syncs, dice: &mut Dice, counts: &mut Counts) {
     });
 }
 
-/// Copies the image as it stands at one moment. A copy takes time, and what is written meanwhile
-/// would give a file system that no power cut leaves: half of one moment and half of a later one. So
-/// it is taken until two in a row are the same, while the service is stopped between any two of
-/// its instructions. Nothing is synced; the kernel only ends what it had begun to write.
+/// Copies the image as it is at one moment. A copy takes time. If the service wrote meanwhile, the
+/// copy would mix two moments, and no power cut leaves that. So the service is stopped, and the
+/// copy is repeated until two copies in a row are equal. Nothing is synced. The kernel only
+/// finishes what it had begun to write.
 fn copy_at_one_moment(image: &Path, copy: &Path) {
     let again = copy.with_extension("again");
     for _ in 0..100 {
@@ -216,7 +216,7 @@ fn copy_at_one_moment(image: &Path, copy: &Path) {
     panic!("{} changes all the time although its writer is stopped", image.display());
 }
 
-/// Hangs up whatever happens, or the people's threads would wait for ever.
+/// Disconnects in every case. Otherwise the people's threads would wait without end.
 struct HangUp<'a>(&'a Signals);
 
 impl Drop for HangUp<'_> {
@@ -225,7 +225,7 @@ impl Drop for HangUp<'_> {
     }
 }
 
-/// Holds what is left after the cut against the promises, and lets people go on with it.
+/// Compares what is left after the cut with the promises, and lets people continue on it.
 fn look(
     cut: &Disk,
     ledgers: &[Ledger],
@@ -252,7 +252,7 @@ fn look(
     counts.promised += wanted;
     drop(store);
 
-    // Everybody finds again what they were told, and every training comes to its end.
+    // Everybody finds what they were told, and every training ends.
     let socket = cut.image.with_extension("socket");
     let server = Server::start(&cut.data(), &socket);
     let signals = Signals::default();

@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// How long anything may take before a test gives up on it; machines are sometimes busy.
+/// How long anything may take before a test fails. Machines are sometimes busy.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct Server {
@@ -25,17 +25,17 @@ pub struct Server {
 pub struct Ended {
     pub status: ExitStatus,
     pub errors: String,
-    /// How long it lived on after a panic that a test wanted.
+    /// How long it ran after a panic that a test wanted.
     pub since_panic: Option<Duration>,
 }
 
-/// The recipe that trains in milliseconds.
+/// A recipe that trains in milliseconds.
 pub fn tiny() -> PathBuf {
     apprentice_testkit::paths::root().join("crates/mind/data/recipes/tiny.toml")
 }
 
 impl Server {
-    /// Starts serving `data` at the socket file `socket`, and does not wait for it.
+    /// Starts serving `data` at the socket file `socket`, without waiting until it serves.
     pub fn spawn(data: &Path, socket: &Path, environment: &[(&str, String)]) -> Server {
         let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
         command
@@ -77,7 +77,7 @@ impl Server {
         Server { child, first_line, is_ready: false, errors: Some(errors), panicked }
     }
 
-    /// As [`Server::ready`], where it is no surprise that it is ready already.
+    /// The same as [`Server::ready`], for a service that may be ready already.
     #[track_caller]
     pub fn ready_once(&mut self) {
         if !std::mem::replace(&mut self.is_ready, true)
@@ -100,7 +100,7 @@ impl Server {
         }
     }
 
-    /// Starts and waits until it serves; panics with what it said if it does not.
+    /// Starts it and waits until it serves. Otherwise panics with what it said.
     #[track_caller]
     pub fn start(data: &Path, socket: &Path) -> Server {
         let mut server = Server::spawn(data, socket, &[]);
@@ -142,7 +142,7 @@ impl Server {
         assert!(sent.is_ok_and(|status| status.success()), "{name} for {id}");
     }
 
-    /// SIGKILL. It must have been alive until then.
+    /// SIGKILL. It must have run until then.
     #[track_caller]
     pub fn kill(mut self) {
         if let Some(ended) = self.end(Duration::ZERO) {
@@ -164,8 +164,8 @@ pub fn endpoint(socket: &Path) -> String {
     format!("ipc://{}", socket.display())
 }
 
-/// Copies a directory with everything in it, but for the copy that a start may have been looking at:
-/// its files may go while they are read, and the next start makes another.
+/// Copies a directory with everything in it, except the copy that a start may have been checking.
+/// Those files may disappear while they are read, and the next start makes another copy.
 pub fn copy_tree(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {

@@ -1,5 +1,5 @@
-/* Loaded before the C library into a process whose disk is to fail: the N-th call of a kind on a
- * file below a directory fails, and for a full disk all that follow fail too.
+/* Makes the disk of a process fail. It is loaded before the C library. The N-th call of a kind on a
+ * file below a directory fails. For a full disk all later calls fail too.
  *
  * FAULT_DIR  the directory
  * FAULT_KIND full (writes, ENOSPC, from the N-th on), write (one write, EIO), sync (one sync, EIO),
@@ -48,14 +48,14 @@ static int ours(int fd, char *path, size_t size) {
 }
 
 static void say(const char *text) {
-    /* Past our own functions. */
+    /* The C library's functions, not ours. */
     int fd = (int)syscall(SYS_openat, AT_FDCWD, mark, O_WRONLY | O_CREAT | O_TRUNC, 0600);
     if (fd < 0) return;
     if (syscall(SYS_write, fd, text, strlen(text)) < 0) { /* nobody to tell */ }
     syscall(SYS_close, fd);
 }
 
-/* The error with which this call is to fail, or 0. */
+/* The error with which this call must fail, or 0. */
 static int fails(int fd, int is_sync) {
     char path[4096], text[64];
     if (!ours(fd, path, sizeof path)) return 0;

@@ -1,6 +1,6 @@
-//! Hostile bytes: every decoder, in process and through a real socket, against what no honest
-//! writer wrote. Each case gets a typed error or a value, never a panic, and takes a bounded amount
-//! of memory. `cargo xtask fuzz --cases N --seed S` runs as many as wanted.
+//! Hostile bytes: bytes that no honest program writes, given to every decoder, in this process and
+//! through a real socket. Each case gives a typed error or a value, never a panic, and takes a
+//! bounded amount of memory. `cargo xtask fuzz --cases N --seed S` runs any number of cases.
 
 mod memory;
 mod mutate;

@@ -1,4 +1,4 @@
-//! Counts what each thread takes from the allocator.
+//! Counts the bytes that each thread allocates.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -6,8 +6,8 @@ use std::cell::Cell;
 pub struct Counting;
 
 thread_local! {
-    /// Bytes held now by what this thread took and gave back; may go below zero when it gives back
-    /// what another took.
+    /// Bytes that this thread allocated and did not free. It is below zero if the thread freed
+    /// bytes of other threads.
     static HELD: Cell<isize> = const { Cell::new(0) };
     static PEAK: Cell<isize> = const { Cell::new(0) };
 }
@@ -20,7 +20,7 @@ fn note(bytes: isize) {
     });
 }
 
-// SAFETY: every call is handed on to the system's allocator as it came; counting allocates nothing.
+// SAFETY: every call goes to the system's allocator unchanged; counting allocates nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size() as isize);
@@ -38,14 +38,14 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // Both are there while one is copied to the other.
+        // Both exist while one is copied to the other.
         note(size as isize);
         note(-(layout.size() as isize));
         unsafe { System.realloc(place, layout, size) }
     }
 }
 
-/// The most bytes that `act` held at once beyond what was held before it.
+/// The most bytes that `act` held at once, beyond those held before it.
 pub fn peak_of<T>(act: impl FnOnce() -> T) -> (T, usize) {
     let before = HELD.with(Cell::get);
     PEAK.with(|peak| peak.set(before));

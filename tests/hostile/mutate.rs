@@ -2,10 +2,10 @@
 
 use apprentice_testkit::dice::Dice;
 
-/// Longest case; longer ones are cut.
+/// Length of the longest case; longer cases are cut.
 const BYTES_MAX: usize = 64 * 1024;
 
-/// Starts of MessagePack values that promise four billion items or bytes, and of smaller lies.
+/// Beginnings of MessagePack values that claim four billion items or bytes, or somewhat too many.
 const BOMBS: [&[u8]; 12] = [
     b"\xdd\xff\xff\xff\xff",
     b"\xdf\xff\xff\xff\xff",
@@ -21,11 +21,11 @@ const BOMBS: [&[u8]; 12] = [
     b"\x7f\xff\xff\xff\xff\xff\xff\xff",
 ];
 
-/// What nests: MessagePack lists and maps, JSON, TOML.
+/// Values that nest: MessagePack lists and maps, JSON, TOML.
 const NESTS: [&[u8]; 9] =
     [b"\x91", b"\x81\xa1a", b"\xdd\x00\x00\x00\x01", b"[", b"{\"a\":", b"a.", b"{a=", b"[[", b"(("];
 
-/// Text that readers of text trip over.
+/// Text that is difficult for readers of text.
 const WORDS: [&str; 14] = [
     "\u{0}",
     "\u{202e}",
@@ -52,7 +52,7 @@ pub fn mutate(dice: &mut Dice, corpus: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-/// Nests as deep as bytes allow, alone and at the end of each example.
+/// Nests values as deep as the bytes allow, alone and at the end of each example.
 pub fn deepest(corpus: &[Vec<u8>], length: usize) -> Vec<Vec<u8>> {
     let mut cases = Vec::new();
     for nest in NESTS {
@@ -78,7 +78,7 @@ fn once(dice: &mut Dice, corpus: &[Vec<u8>], bytes: &mut Vec<u8>) {
         }
         2 => bytes.truncate(place),
         3 => {
-            // The head of one with the tail of another.
+            // The beginning of one with the end of another.
             let other = &corpus[dice.below(corpus.len())];
             bytes.truncate(place);
             bytes.extend_from_slice(&other[dice.below(other.len() + 1)..]);
@@ -104,7 +104,7 @@ fn once(dice: &mut Dice, corpus: &[Vec<u8>], bytes: &mut Vec<u8>) {
         }
         10 => insert(bytes, place, WORDS[dice.below(WORDS.len())].as_bytes()),
         _ => {
-            // One byte is another: a length, a kind, a digit.
+            // One byte is changed: a length, a kind, a digit.
             if let Some(byte) = bytes.get_mut(place) {
                 *byte = [0, 1, 0x7f, 0x80, 0xff, b'9', dice.below(256) as u8][dice.below(7)];
             }

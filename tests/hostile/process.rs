@@ -1,4 +1,4 @@
-//! Every decoder in process, on as many threads as there are cores.
+//! Every decoder in this process, on as many threads as there are cores.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,13 +11,13 @@ use crate::mutate::{deepest, mutate};
 use crate::targets::{self, Target};
 use apprentice_testkit::dice::Dice;
 
-/// Stack of the threads that people's actors live on.
+/// Stack of the threads that run people's actors.
 const STACK: usize = 2 * 1024 * 1024;
-/// Memory that any case may take, and how much more for each of its bytes. A list of large items
-/// is given room for a megabyte of them at once, at each level of nesting.
+/// Memory that each case may take, and how much more for each of its bytes. A list of large items
+/// may reserve a megabyte at once at each level of nesting.
 const BYTES_MAX: usize = 8 * 1024 * 1024;
 const TIMES_MAX: usize = 128;
-/// Bytes of the deepest nests: as much as any file that a client sends.
+/// Bytes of the deepest nesting: as much as the largest file that a client sends.
 const DEEPEST: usize = SCENE_FILE_BYTES_MAX;
 
 #[derive(Default)]

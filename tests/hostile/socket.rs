@@ -1,4 +1,4 @@
-//! The door itself, through a real socket.
+//! The endpoint, through a real socket.
 
 use std::time::{Duration, Instant};
 
@@ -14,9 +14,9 @@ use crate::targets;
 use apprentice_testkit::dice::Dice;
 use apprentice_testkit::toy;
 
-/// Messages before the answers to all of them are awaited.
+/// Messages that are sent before the test waits for the answers to all of them.
 const WINDOW: usize = 50;
-/// Memory that the service may take for all of it, beyond what it has when it starts.
+/// Memory that the service may take for all messages, beyond that at its start.
 const MEMORY_MAX: u64 = 256 * 1024 * 1024;
 
 #[derive(Debug, Default)]
@@ -49,7 +49,7 @@ impl Peer<'_> {
         self.socket.send_multipart(frames, 0).unwrap();
     }
 
-    /// Asks who is there, and takes in every answer up to that one.
+    /// Sends `hello`, and reads every answer up to the one to it.
     fn settle(&self, counts: &mut Counts) {
         let id = fresh_id();
         let user = UserId::new("mallory").unwrap();
@@ -88,14 +88,14 @@ pub fn run(messages: usize, seed: u64) {
     let mut sent = 0;
     for message in 0..messages {
         match dice.below(100) {
-            // The server hangs up; what else was on its way is lost with the connection.
+            // The server disconnects. What else was on its way is lost with the connection.
             0 if counts.cut_off < 20 => {
                 peer.settle(&mut counts);
                 sent += 1;
                 let huge = Peer::new(&service);
                 huge.send(&[vec![b'x'; 2 * FRAME_BYTES_MAX + 1 + dice.below(FRAME_BYTES_MAX)]]);
                 counts.cut_off += 1;
-                // Each comes from a new address, as after a reconnection.
+                // Each comes from a new address, as after a new connection.
                 peer = Peer::new(&service);
                 continue;
             }
@@ -151,8 +151,8 @@ pub fn run(messages: usize, seed: u64) {
     }
     peer.settle(&mut counts);
     sent += 1;
-    // Every message was answered or dropped, and counted. What woke somebody may be answered after
-    // the last question of the door itself.
+    // Every message was answered, or dropped and counted. A message that woke a user may be
+    // answered after the last question to the endpoint.
     let whole = messages - counts.cut_off + sent;
     let end = Instant::now() + Duration::from_secs(60);
     let seen = loop {
@@ -177,7 +177,7 @@ pub fn run(messages: usize, seed: u64) {
     ] {
         assert!(count > 0 || messages < 10_000, "no message was {kind}");
     }
-    // And it serves.
+    // And it still serves.
     let grace =
         Client::connect(service.endpoint().unwrap(), UserId::new("grace").unwrap()).unwrap();
     let grace = grace.with_patience(Duration::from_secs(30));

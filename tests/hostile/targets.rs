@@ -1,4 +1,4 @@
-//! Every decoder with valid examples of what it reads.
+//! Every decoder, with valid examples of what it reads.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -30,12 +30,12 @@ use apprentice_testkit::diary::Diary;
 use apprentice_testkit::paths::root;
 use apprentice_testkit::samples::samples;
 
-/// Says whether the bytes were read; a refusal is as good.
+/// True if the bytes were read. A refusal is just as good.
 pub type Decoder = dyn Fn(&[u8]) -> bool + Send + Sync;
 
 pub struct Target {
     pub name: &'static str,
-    /// Its share of the cases: cheap decoders get many.
+    /// Its share of the cases: fast decoders get many.
     pub weight: u64,
     pub corpus: Vec<Vec<u8>>,
     pub read: Box<Decoder>,
@@ -47,7 +47,7 @@ fn target(
     corpus: Vec<Vec<u8>>,
     read: impl Fn(&[u8]) -> bool + Send + Sync + 'static,
 ) -> Target {
-    // Examples that are not read would mean that nothing behind the first check is tried.
+    // If the examples cannot be read, nothing behind the first check is tested.
     for example in &corpus {
         assert!(read(example), "{name} does not read its own example");
     }
@@ -69,7 +69,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// A reader of files, given a file.
+/// A decoder that reads a file, given the path of a file.
 fn from_file(folder: &Path, name: &str, bytes: &[u8], read: impl Fn(&Path) -> bool) -> bool {
     let thread = std::thread::current().id();
     let path = folder.join(format!("{name}-{thread:?}"));
@@ -127,7 +127,7 @@ pub fn requests() -> Vec<Vec<u8>> {
     .collect()
 }
 
-/// What only operators may ask, for the decoder alone.
+/// Requests of operators, for the decoder alone.
 fn orders() -> Vec<Vec<u8>> {
     let (key, new) = (PublicKey([3; 32]), PublicKey([4; 32]));
     let quotas = Quotas { utterances_per_second: Some(3), ..Quotas::default() };
@@ -151,7 +151,7 @@ fn orders() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// A record in each kind of feed, as a message of the feed and as an answer at the door.
+/// A record in each kind of feed, as a message of the feed and as an answer at the endpoint.
 fn feeds() -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
     let (stream, seq) = (StreamKey([5; 16]), Seq::new(1).unwrap());
     let digest = Digest::of(b"a record");
@@ -183,7 +183,7 @@ fn feeds() -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
     (messages, answers.to_vec())
 }
 
-/// A life in the household: an export of it, its state, its mind.
+/// A history in the household: an export of it, its state, its mind.
 struct Past {
     folder: tempfile::TempDir,
     household: Arc<Household>,
@@ -242,7 +242,7 @@ pub fn all() -> Vec<Target> {
     let read = |path: &Path| std::fs::read(path).unwrap();
     let secret = read(&store::key_file_of(&exported));
     let heads = read(&data.join("HEADS"));
-    // Without the space that is made in advance: it would be most of each case.
+    // Without the space that is allocated in advance: it would be most of each case.
     let heads_end = heads.iter().rposition(|&byte| byte != 0).unwrap() + 1;
     let users = data.join("keys/users/local");
     let user_file = std::fs::read_dir(&users).unwrap().next().unwrap().unwrap().path();
@@ -296,14 +296,14 @@ pub fn all() -> Vec<Target> {
     targets
 }
 
-/// Files that live for one case are kept off the disk where that is possible.
+/// Files of one case are not on a disk, if that is possible.
 fn ram() -> PathBuf {
     let ram = PathBuf::from("/dev/shm");
     if ram.is_dir() { ram } else { std::env::temp_dir() }
 }
 
-/// Bodies, frames and sealed frames. The checks in front of a body let hardly a changed byte
-/// through, so each is also tried with what stands behind it made good again.
+/// Bodies, frames and sealed frames. The checks in front of a body refuse nearly every changed
+/// byte. So each changed body is also tried behind correct checks.
 fn records() -> Vec<Target> {
     let bodies: Vec<Vec<u8>> = samples()
         .iter()
@@ -315,7 +315,7 @@ fn records() -> Vec<Target> {
             bytes
         })
         .collect();
-    // A former version, whose fields are among today's.
+    // A former version, whose fields are also in today's.
     let former = samples().into_iter().find(|(name, _)| *name == "retrain_completed").map(|it| {
         let mut bytes = (EventKind::RetrainCompleted as u16).to_be_bytes().to_vec();
         bytes.extend(1_u16.to_be_bytes());
@@ -341,7 +341,7 @@ fn records() -> Vec<Target> {
     let remade = {
         let open = open.clone();
         move |bytes: &[u8]| {
-            // The checksum is no secret: whoever wants can make it fit.
+            // The checksum is no secret: an attacker can correct it.
             let mut bytes = bytes.to_vec();
             if bytes.len() >= Header::BYTES {
                 let length = ((bytes.len() - Header::BYTES) as u32).to_be_bytes();

@@ -1,4 +1,4 @@
-//! The paper's baseline: a core grammar over the seeds that answers first, else a neural
+//! The paper's baseline: a core grammar over the seeds answers first, otherwise a neural
 //! sequence-to-sequence model (section 4 of the paper; Jia and Liang 2016). Each is a recipe.
 
 use std::sync::Arc;
@@ -14,7 +14,7 @@ fn recipe(name: &str) -> Recipe {
     Recipe::parse(Recipe::builtin(name).unwrap()).unwrap()
 }
 
-/// Somebody in a kitchen, before and after lessons.
+/// A person in a kitchen, before and after lessons.
 struct Talk {
     household: Household,
     recipe: Recipe,
@@ -45,7 +45,7 @@ impl Talk {
         self.mind = train(&self.household, &self.recipe, &self.lessons).unwrap();
     }
 
-    /// What was understood, whether or not it can be done here, and by which part.
+    /// What was understood, even if it cannot be done here, and which part understood it.
     fn ask(&self, text: &str) -> (String, Vec<Answerer>) {
         let moment = Moment {
             domain: &self.household,
@@ -65,7 +65,7 @@ impl Talk {
     }
 }
 
-/// The lifted forms with names in their slots, and the program about the same names.
+/// The lifted forms with names in their slots, and the program with the same names.
 fn said(exemplar: &Exemplar) -> (String, String) {
     let names = [("mug", "Mug"), ("fridge", "Fridge"), ("microwave", "Microwave")];
     let mut text = exemplar.utterance.to_string();
@@ -86,8 +86,8 @@ fn the_grammar_answers_every_seed_and_its_closed_class_variants() {
     for seed in &talk.household.seeds().exemplars {
         let (text, program) = said(seed);
         if text.starts_with("switch ") {
-            // A switch is a thing as well, and the paper's abstraction takes it for one. That the
-            // grammar has the seed is a condition of every training.
+            // A switch is a thing too, and the paper's abstraction reads it as one. Every training
+            // requires that the grammar has the seed.
             continue;
         }
         assert_eq!(talk.ask(&text), (program.clone(), by.clone()), "{text}");
@@ -151,7 +151,7 @@ fn the_model_alone_writes_every_seed_and_always_answers() {
             assert_ne!(talk.ask(&text).0, "?", "{text}");
         }
     }
-    // The paper's anecdote: it takes a request that nobody taught for a primitive.
+    // The paper's anecdote: it reads an untaught request as a primitive.
     let (program, _) = talk.ask("wash the coffee mug");
     println!("wash the coffee mug: {program}");
     assert!(program.ends_with(" Mug") && !program.contains(';'), "{program}");

@@ -1,4 +1,4 @@
-//! Forgetting a lesson gives the mind of never having been taught it, and leaves the past alone.
+//! Forgetting a lesson gives the same mind as never having taught it, and does not change the past.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use apprentice::world::household::Household;
 use apprentice_testkit::diary::Diary;
 use apprentice_testkit::toy::config;
 
-/// Words without a meaning, and a request for the action that each is taught to stand for.
+/// Words without a meaning, and a request for the action that each is taught to mean.
 const LESSONS: [(&str, &str); 4] = [
     ("boogie", "go to the fridge"),
     ("tidy up", "go to the sink"),
@@ -29,7 +29,7 @@ fn person() -> Diary<Household> {
     Diary::new(&domain, &open_memory(), "ada", Recipe::builtin("default").unwrap())
 }
 
-/// An episode up to its teaching, in which one lesson was taught.
+/// An episode in which one lesson was taught.
 fn teach(diary: &mut Diary<Household>, index: usize) -> Seq {
     let (words, request) = LESSONS[index];
     diary.start("free kitchen");
@@ -77,7 +77,7 @@ fn what_is_forgotten_while_teaching_is_gone_with_the_next_training() {
     assert_eq!(diary.session.phase(), Phase::Teaching);
     diary.learn();
     assert_eq!(diary.session.state().mind, Some(mind_of(&[1, 2])));
-    // One that was taught a moment ago, too.
+    // The same for a lesson that was taught just before.
     let lesson = teach(&mut diary, 3);
     diary.accept(&Command::Forget { lesson });
     diary.learn();
@@ -103,7 +103,8 @@ fn nothing_is_forgotten_during_an_episode_or_a_training_or_twice() {
 fn past_answers_stay_and_lessons_built_with_it_keep_working() {
     let mut diary = person();
     let boogie = taught(&mut diary, &[0])[0];
-    // The second lesson is taught by saying the first: it holds what was done, not what was said.
+    // The second lesson is taught with the words of the first. It contains what was done, not what
+    // was said.
     diary.start("free kitchen");
     diary.say("have a party");
     diary.say("boogie");
@@ -142,7 +143,7 @@ fn a_failed_training_after_forgetting_leaves_a_mind_that_can_be_rebuilt() {
     let recipe = diary.session.recipe().digest();
     diary.accept(&Command::FinishRetrain { recipe, outcome: Err("no room".to_owned()) });
     assert_eq!(diary.session.state().mind, mind, "the former mind stays");
-    // Its lessons are still known to whoever has to train it again.
+    // Its lessons are still there for a later training.
     let minds = apprentice::replay::Minds::default();
     let domain = diary.session.domain().clone();
     let woken = apprentice::replay::rebuild(&domain, &diary.store, &diary.stream, &minds).unwrap();

@@ -1,5 +1,5 @@
-//! The bytes of every record kind, as they were when released: they still open, they still mean
-//! the same, and today's encoder still writes them. `UPDATE_GOLDEN=1` writes files anew.
+//! The bytes of every kind of record, as released. They can still be read, they still mean the
+//! same, and today's encoder still writes them. `UPDATE_GOLDEN=1` writes the files again.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -26,7 +26,7 @@ fn updating() -> bool {
     std::env::var_os("UPDATE_GOLDEN").is_some_and(|value| value == "1")
 }
 
-/// The first record of a stream, with everything fixed that is otherwise random.
+/// The first record of a stream. Everything that is otherwise random is fixed.
 fn frame(event: Event) -> Vec<u8> {
     let request = RequestId(*b"golden request 1");
     let batch = Batch { request, at: Timestamp(1_700_000_000_000_000), events: vec![event] };
@@ -73,7 +73,7 @@ fn snake(kind: EventKind) -> String {
     name
 }
 
-/// Compares a committed file with what it should hold, or writes it.
+/// Compares a committed file with its expected content, or writes it.
 fn check_file(path: &Path, expected: &[u8]) {
     if updating() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -104,7 +104,7 @@ fn todays_encoder_writes_the_golden_bytes() {
 #[test]
 fn every_golden_record_opens_and_means_what_it_meant() {
     if updating() {
-        // The other test is writing the files right now.
+        // The other test is writing the files at this moment.
         return;
     }
     let (mut kinds, mut versions) = (BTreeMap::new(), BTreeSet::new());
@@ -114,8 +114,8 @@ fn every_golden_record_opens_and_means_what_it_meant() {
             let bytes = fs::read(&path).unwrap();
             let (header, _, _) = Header::unframe(&bytes).unwrap();
             *kinds.entry(header.kind).or_insert(0) += 1;
-            // `.json` says what was written, for ever; where that is another form than today's,
-            // `.upcast.json` says what it means.
+            // `.json` always says what was written. If today's form is different, `.upcast.json`
+            // says what it means.
             let event = open(&bytes);
             let meaning = match header.version == event.kind().version() {
                 true => path.with_extension("json"),
@@ -151,7 +151,7 @@ fn the_samples_are_read_back_as_the_same_events() {
     }
 }
 
-/// Paths of the fields in a value, with the kind of value that stands there.
+/// Paths of the fields in a value, with the kind of each value.
 fn fields(path: &str, value: &Value, found: &mut BTreeMap<String, Vec<&'static str>>) {
     let kind = match value {
         _ if DOCUMENTS.contains(&path) => "document",

@@ -1,4 +1,4 @@
-//! What is understood, taught, learned and recorded. Uses the library alone; see `tests/README.md`.
+//! What is understood, taught, learned and recorded. Uses only the library; see `tests/README.md`.
 
 mod any_stage;
 mod baseline;

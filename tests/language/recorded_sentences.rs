@@ -1,6 +1,6 @@
-//! The recipes meet what people really said: recorded sentences for one pick-up, put-down or
-//! switch each, in scenes made so that the right primitive can run. Needs the shared data folder
-//! and is skipped, with a message, where that is absent.
+//! The recipes on recorded sentences, each for one pick-up, put-down or switch, in scenes in which
+//! the right primitive can run. Needs the shared data folder; without it the test is skipped with a
+//! message.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -33,7 +33,7 @@ struct Case {
     scene: Scene,
 }
 
-/// Recorded sentences for washing, heating and cooling, with what they stand for.
+/// Recorded sentences for washing, heating and cooling, with their meaning.
 fn lessons(path: &Path, count: usize) -> Vec<Lesson<Scene, Task>> {
     let household = Household::new();
     let file = std::fs::File::open(path).unwrap();
@@ -60,7 +60,7 @@ struct Tally {
     unsure: usize,
 }
 
-/// For each primitive but GOTO and the doors, sentences that mean it alone, spread evenly.
+/// For each primitive except GOTO, OPEN and CLOSE, sentences that mean it alone, spread evenly.
 fn cases(path: &Path) -> Vec<Case> {
     let file = std::fs::File::open(path).unwrap();
     let lines = BufReader::new(flate2::read::GzDecoder::new(file)).lines();
@@ -118,7 +118,7 @@ fn task() -> Task {
     task
 }
 
-/// Walking there first is not held against an answer.
+/// An answer may walk there first.
 fn without_walks(program: &Program) -> Vec<&Step> {
     program.steps.iter().filter(|step| step.operator != "GOTO").collect()
 }

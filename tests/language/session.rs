@@ -1,5 +1,5 @@
-//! The decider: given events, when a command, then events or a refusal. Over the toy world of
-//! bells, through a log in memory, since only a log gives the receipts that `settle` wants.
+//! The decider: given events, when a command, then events or a refusal. It runs in the toy world of
+//! bells, with a log in memory, because only a log gives the receipts that `settle` needs.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use apprentice::store::{Store, open_memory};
 use apprentice::world::Stage;
 use apprentice_testkit::toy::Bells;
 
-/// One person with a session and a log, driven by hand.
+/// One person with a session and a log, without an actor.
 struct Person {
     session: Session<Bells>,
     store: Store,
@@ -38,7 +38,7 @@ impl Person {
         person
     }
 
-    /// A person in the wanted phase.
+    /// A person in the given phase.
     fn at(phase: Phase) -> Person {
         let mut person = Person::new();
         if phase == Phase::Closed {
@@ -90,13 +90,13 @@ impl Person {
         self.accept(&Command::Say { utterance: utterance.to_owned() })
     }
 
-    /// Teaches the first utterance that is still to be taught.
+    /// Teaches the first utterance that can still be taught.
     fn teach_last(&mut self, actions: &[u32], on_clash: OnClash) -> Result<Reply, Rejection> {
         let explains = self.session.status().to_teach[0].seq;
         self.give(&Command::Teach { explains, actions: actions.to_vec(), on_clash })
     }
 
-    /// Does the work that the state says is due, as the actor and its trainer do.
+    /// Does the outstanding work of the state, as the actor and its trainer do.
     fn learn(&mut self) {
         let Some(Outstanding::Retrain { recipe, lessons }) = self.session.outstanding() else {
             panic!("nothing is due");
@@ -279,8 +279,8 @@ fn a_clash_is_put_to_the_person_and_replacing_forgets_the_old_lesson() {
     let mut person = Person::at(Phase::Teaching);
     person.teach_last(&[1], OnClash::Ask).unwrap();
     person.accept(&Command::FinishTeaching);
-    // While learning nothing else is taught, so the second meaning comes from a world in which the
-    // first one could not run: the bell rings already.
+    // Nothing else can be taught while learning. So the second meaning comes from a world in which
+    // the first one cannot run, because the bell rings already.
     person.learn();
     person.start("Brass Silver");
     person.say("ring the brass bell");

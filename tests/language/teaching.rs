@@ -1,5 +1,5 @@
-//! A person talks to the robot in the household and teaches it: what they say is understood,
-//! impossible, or not sure, and one lesson is enough.
+//! A person talks to the robot in the household and teaches it. What they say is understood,
+//! impossible, or not sure. One lesson is enough.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::world::household::{Household, Room, Scene, SceneBuilder, Task};
 use apprentice::world::{Domain, Stage};
 
-/// One conversation: what is understood is carried out.
+/// One conversation. What is understood is carried out.
 struct Talk {
     household: Household,
     recipe: Recipe,
@@ -126,7 +126,7 @@ fn simple_requests_are_understood_from_the_first_day() {
         talk.check("pick it up", "! a Faucet cannot be picked up");
         talk.check("pick up the mug", "PICKUP Mug");
         talk.check("go to the fridge", "GOTO Fridge");
-        // What is opened is where the robot stands, where the recipe looks for what can be opened.
+        // The recipe looks where the robot stands for things that can be opened.
         let said = match recipe {
             "paper" => {
                 talk.check("open it and put it in the fridge", "! a Mug cannot be opened");
@@ -147,7 +147,7 @@ fn a_far_thing_is_walked_to_only_where_the_recipe_says_so() {
     talk.check("pick up the tomato", "! the Tomato is out of reach");
     let mut talk = Talk::new("default");
     talk.check("pick up the tomato", "GOTO Tomato; PICKUP Tomato");
-    // Said in one, it is a means to something that nobody named; said step by step it is not.
+    // In one sentence it is a means to something that was not named; in single steps it is not.
     talk.check("put it in the sink, then turn on the faucet", "?");
     talk.check("put it in the sink", "GOTO SinkBasin; PUT Tomato SinkBasin");
     talk.check("turn on the faucet", "TOGGLE Faucet");

@@ -1,7 +1,8 @@
-//! The product in its own words: every file in `tests/transcripts/` is played against a real
-//! service, each as one new person, and every answer must be the written one.
+//! Every transcript in `tests/transcripts/` is played on a real service, each as a new person.
+//! Every answer must be the one in the file.
 //!
 //! After a change that is meant to change answers, `apprentice transcript run FILE` prints the new
+//! ones. Read them before you replace the old ones.
 //! ones; read them before they replace the old.
 
 use std::collections::BTreeMap;
@@ -41,7 +42,7 @@ fn every_transcript_gets_the_answers_it_has() {
         services.entry(recipe).or_insert_with_key(|recipe| service(recipe));
     }
 
-    // Several people talk to one service at once; none may hear another's answers.
+    // Several people talk to one service at once. No person may get another's answers.
     let next = AtomicUsize::new(0);
     let play = || {
         let mut wrong = Vec::new();

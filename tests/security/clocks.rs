@@ -1,5 +1,5 @@
-//! What clocks cannot do, through the doors of a service whose clock the test sets: no jump of it
-//! lets a retired key in, and no time in the log is taken for what a clock read.
+//! What clocks cannot do, through the endpoints of a service whose clock the test sets. No jump of
+//! the clock admits a retired key again. No held time in the log counts as a reading of the clock.
 
 use std::path::{Path, PathBuf};
 use std::process;
@@ -14,7 +14,7 @@ use apprentice::tenancy::{Clock, Role};
 use apprentice::world::Stage;
 use apprentice_testkit::toy::config;
 
-/// Seconds since 1970, some day in 2026.
+/// Seconds since 1970, a day in 2026.
 const TODAY: u64 = 1_790_000_000;
 const DAY: u64 = 24 * 60 * 60;
 const YEARS: u64 = 10 * 365 * DAY;
@@ -59,7 +59,7 @@ impl ActorSystem {
         self.folder.path().join("data")
     }
 
-    /// Starts the service, or starts it anew, with the clock at `seconds`.
+    /// Starts the service, or starts it again, with the clock at `seconds`.
     fn start(&mut self, seconds: u64) {
         self.stop();
         self.at(seconds);
@@ -105,7 +105,7 @@ impl ActorSystem {
         Client::connect_as(&self.service().curve_endpoints()[0], user("ada"), identity).unwrap()
     }
 
-    /// Neither an open connection nor a new one is served.
+    /// Neither an open connection nor a new one gets an answer.
     fn shut(&self, open: &Client) {
         match open.status() {
             Err(ClientError::Failed { code: ErrorCode::Denied, .. }) => {}
@@ -151,7 +151,7 @@ fn an_overlap_that_was_seen_to_end_stays_ended_and_a_later_record_tells_the_next
     actors.shut(&open);
     actors.at(TODAY + 30);
     actors.shut(&open);
-    // Something that has nothing to do with the key is recorded after its end.
+    // Something else is recorded after the end of the key.
     actors.at(TODAY + 61);
     actors.order(Order::Disable { reason: "a pause".to_owned() });
     actors.order(Order::Enable);
@@ -167,7 +167,7 @@ fn a_clock_set_back_before_an_overlap_began_ends_it() {
     actors.retire(60);
     actors.at(TODAY - 1);
     actors.shut(&open);
-    // What is recorded now has a held time; a record says what the clock read.
+    // Records have held times now. A record of the retired key says what the clock read.
     assert_eq!(actors.order(Order::Disable { reason: "a pause".to_owned() }), 2);
     actors.order(Order::Enable);
     actors.start(TODAY + 30);
@@ -210,7 +210,7 @@ fn a_shorter_overlap_takes_effect_and_one_beyond_the_bound_is_refused() {
     actors.shut(&open);
 }
 
-/// Runs a command that goes well.
+/// Runs a command that must succeed.
 fn said(arguments: &[&str], data: &Path) -> String {
     let output = process::Command::new(env!("CARGO_BIN_EXE_apprentice"))
         .args(arguments)
@@ -242,7 +242,7 @@ fn the_log_shows_which_times_were_held() {
     let held: Vec<bool> = said.map(|at| lines[at + 1].trim() == HELD).collect();
     assert_eq!(held, [false, true, false], "{shown}");
 
-    // Times never run backwards, in a tenant's own stream neither.
+    // Times never run backwards, also in a tenant's own stream.
     let store = store::open(&actors.directory()).unwrap();
     for stream in [
         store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap(),

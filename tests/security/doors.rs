@@ -1,4 +1,5 @@
-//! Who comes in, as whom, and who does not: the door with keys from outside, through real sockets.
+//! Which keys are admitted, and as whom, at the endpoint with keys, from outside, through real
+//! sockets.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -18,7 +19,7 @@ use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::Stage;
 use apprentice_testkit::toy::config;
 
-/// Within this a client must know that it is not let in.
+/// A client must know within this time that it is not admitted.
 const BOUND: Duration = Duration::from_secs(20);
 
 fn user(name: &str) -> UserId {
@@ -33,7 +34,7 @@ fn task() -> Stage {
     Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }
 }
 
-/// A service of bells with an open door and one with keys.
+/// A service of bells with an endpoint without keys and one with keys.
 fn bells(data: Data) -> Service {
     let mut config = config(data);
     config.listen = vec!["tcp://127.0.0.1:0".to_owned()];
@@ -71,7 +72,7 @@ fn retire(key: &CurveKey) -> Order {
     Order::Retire { key: *key.public(), overlap_seconds: 0 }
 }
 
-/// The code and the sentence of a request that was not carried out.
+/// The code and the sentence of a request that was refused.
 fn denied<T: std::fmt::Debug>(result: Result<T, ClientError>) -> String {
     match result {
         Err(ClientError::Failed { code: ErrorCode::Denied, message }) => message,
@@ -96,7 +97,7 @@ fn whoever_has_an_admitted_key_talks_and_teaches() {
     ada.start(task()).unwrap();
     ada.say("ring the brass bell").unwrap();
     assert_eq!(ada.status().unwrap().utterances, 1);
-    // The single user of this machine needs no key and meets none of the lab's people.
+    // The single user of this machine needs no key and sees none of the lab's people.
     let local = Client::connect(service.endpoint().unwrap(), user("ada")).unwrap();
     assert_eq!(local.status().unwrap().episodes, 0);
     assert!(service.counts().handshakes >= 1);
@@ -113,7 +114,7 @@ fn two_labs_with_one_name_for_their_people_do_not_meet() {
     assert_eq!(b.status().unwrap().episodes, 0, "nothing of the other lab's");
     b.start(task()).unwrap();
     assert_eq!((a.status().unwrap().utterances, b.status().unwrap().utterances), (1, 0));
-    // Not even a request id brings out the other's reply.
+    // The same request id does not give the other lab's reply.
     let id = fresh_id();
     let command = |text: &str| Command::Say { utterance: text.to_owned() };
     let mine = a.command_again(id, command("ring the brass bell")).unwrap();
@@ -226,7 +227,7 @@ fn whoever_knocks_at_the_wrong_door_or_at_a_wrong_service_is_told_so() {
     assert!(matches!(error, ClientError::WrongServer { .. }), "{error}");
     assert!(error.to_string().contains("keys show"), "{error}");
     service.stop().unwrap();
-    // A port that nobody listens at, and that nobody is given meanwhile.
+    // A port on which nothing listens, and which nothing else gets meanwhile.
     let gone = connect_to("tcp://127.0.0.1:1", &key, PublicKey([1; 32]));
     let error = timed(gone.with_patience(Duration::from_millis(300)));
     assert!(matches!(error, ClientError::NoAnswer { .. }), "{error}");
@@ -236,7 +237,7 @@ fn connect_to(endpoint: &str, key: &CurveKey, server: PublicKey) -> Client {
     Client::connect_as(endpoint, user("ada"), Identity { key: key.clone(), server }).unwrap()
 }
 
-/// A socket with a key that says what it likes.
+/// A socket with a key that can send anything.
 fn stranger(service: &Service, key: &CurveKey, folder: &tempfile::TempDir) -> zmq::Socket {
     let path = folder.path().join(fresh_id().to_string());
     key.write_new(&path).unwrap();
@@ -296,7 +297,7 @@ fn a_thousand_denied_handshakes_leave_the_service_serving() {
             assert!(Instant::now() < end, "after {knocked}: {:?}", service.counts());
             thread::sleep(Duration::from_millis(1));
         }
-        // The doors are open to those who may come in, all the while.
+        // The endpoints serve admitted clients all the time.
         ada.say("polish the silver bell").unwrap();
         assert!(sockets.iter().all(|socket| socket.poll(zmq::POLLIN, 0).unwrap() == 0));
     }
@@ -352,7 +353,7 @@ fn a_service_keeps_its_key_and_its_labs_over_a_restart() {
     assert!(error.to_string().contains("chmod 600"), "{error}");
 }
 
-/// The code of an order that was not carried out, and the sentence.
+/// The code and the sentence of an order that was refused.
 fn refused<T: std::fmt::Debug>(result: Result<T, ClientError>) -> (ErrorCode, String) {
     match result {
         Err(ClientError::Failed { code, message }) => (code, message),
@@ -370,7 +371,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
         role,
         label: "by the host".to_owned(),
     };
-    // The single user of this machine begins, without any set-up.
+    // The single user of this machine can begin without any setup.
     let local = Client::connect(service.endpoint().unwrap(), user("root")).unwrap();
     local.order(None, admit(&host_key, Role::Operator)).unwrap();
     let host = connect(&service, &host_key, "host");
@@ -388,7 +389,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     assert_eq!(names(&a, None), ["lab-a"], "its own and no other");
     assert_eq!(a.tenants(None).unwrap()[0].keys.len(), 1);
 
-    // Its own keys are its own affair.
+    // It may manage its own keys.
     let gateway = CurveKey::new().unwrap();
     a.order(None, admit(&gateway, Role::Gateway)).unwrap();
     connect(&service, &gateway, "ada").start(task()).unwrap();
@@ -397,7 +398,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     assert_eq!(a.order(Some(tenant("lab-a")), rotate).unwrap().recorded, 2);
     assert_eq!(connect(&service, &next, "ada").status().unwrap().episodes, 1);
 
-    // The others' are not, nor is what protects them.
+    // It may not manage those of others, and not the quotas, which protect the others.
     let quotas = Quotas { awake_users: Some(1_000_000), ..Quotas::default() };
     let disable = || Order::Disable { reason: "rivalry".to_owned() };
     for (about, order) in [
@@ -420,7 +421,8 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
         assert_eq!(message, format!("this needs a key with the role operator; yours is {role}"));
     }
 
-    // What makes no sense is refused by name, and what is another's key says no more than that.
+    // An order that makes no sense is refused by name. The refusal says nothing more about a key of
+    // another lab.
     let (code, message) = refused(a.order(None, admit(&a_key, Role::Auditor)));
     assert!(code == ErrorCode::Refused && message.contains("operator"), "{message}");
     let (code, message) = refused(a.order(None, admit(&b_key, Role::Gateway)));
@@ -430,7 +432,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     host.order(Some(tenant("lab-a")), Order::SetQuotas(quotas)).unwrap();
     assert_eq!(a.tenants(None).unwrap()[0].quotas, quotas);
 
-    // A lab's operator erases its people, not the other lab's.
+    // A lab's operator erases only people of its own lab.
     let ada = connect(&service, &next, "ada");
     denied(a.erase(Some(tenant("lab-b")), user("ada")));
     denied(ada.erase(None, user("ada")));
@@ -451,7 +453,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     let first = erase();
     assert_eq!(ada.status().unwrap().episodes, 0, "somebody new");
     ada.start(task()).unwrap();
-    // The answer was lost, say, and the request is sent once more.
+    // The answer was lost, for example, and the request is sent again.
     assert_eq!(erase(), first);
     assert_eq!(ada.status().unwrap().episodes, 1, "the new bearer of the name is not erased");
     let second = a.erase(None, user("ada")).unwrap();
@@ -459,7 +461,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     let (code, message) = refused(a.erase(None, user("nobody")));
     assert!(code == ErrorCode::Refused && message.contains("no records"), "{message}");
 
-    // An operator can shut the door behind themselves.
+    // An operator can retire its own key.
     a.order(None, Order::Retire { key: *a_key.public(), overlap_seconds: 0 }).unwrap();
     denied(a.tenants(None));
     service.stop().unwrap();
@@ -469,7 +471,7 @@ fn apprentice(arguments: &[&str]) -> process::Output {
     process::Command::new(env!("CARGO_BIN_EXE_apprentice")).args(arguments).output().unwrap()
 }
 
-/// What a command printed; it went well.
+/// The output of a command that succeeded.
 fn said(arguments: &[&str]) -> String {
     let output = apprentice(arguments);
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -477,7 +479,7 @@ fn said(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What a command complained of, with its exit code.
+/// The error of a command, with its exit code.
 fn complained(arguments: &[&str]) -> (i32, String) {
     let output = apprentice(arguments);
     (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
@@ -498,7 +500,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     assert!(code == 2 && text.contains("already exists"), "{text}");
     let public = |file: &str| format!("{file}.pub");
 
-    // Closed: the first tenant makes the directory.
+    // The service is stopped: the first tenant makes the directory.
     let (host_pub, lab_pub, next_pub) = (public(&host), public(&lab), public(&next));
     said(&["tenant", "add", "lab-a", "--data", &data]);
     said(&["tenant", "admit", "local", &host_pub, "--role", "operator", "--data", &data]);
@@ -513,7 +515,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     let (code, text) = complained(&["tenant", "list", "lab-z", "--data", &data]);
     assert!(code == 1 && text.contains("no tenant lab-z"), "{text}");
 
-    // Running: the same words, with the operator's key.
+    // The service runs: the same commands, with the operator's key.
     let mut config = config(Data::Directory(folder.path().join("data")));
     config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
     let service = Service::start(config).unwrap();
@@ -551,12 +553,13 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     assert!(code == 1 && text.contains("does not let in your key"), "{text}");
     service.stop().unwrap();
 
-    // And closed again: what was ordered is there.
+    // And stopped again: the orders had their effect.
     let listed = said(&["tenant", "list", "lab-a", "--data", &data]);
     assert!(listed.contains("at most 5 people awake") && listed.contains("until"), "{listed}");
 }
 
-/// A server whose handshakes nobody answers would let everybody in: it must end instead.
+/// If no thread answers handshakes, ZeroMQ admits every connection. So the service must end
+/// instead.
 #[test]
 fn a_service_that_cannot_answer_handshakes_ends_and_answers_nobody() {
     let folder = tempfile::tempdir().unwrap();

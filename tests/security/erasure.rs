@@ -1,4 +1,4 @@
-//! A person who is erased is gone from the data directory, and nobody else's records suffer.
+//! An erased person is gone from the data directory, and the records of all others stay.
 
 use std::fs;
 use std::io::Write;
@@ -18,7 +18,7 @@ use apprentice::store;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
 
-/// Words that nobody else says and no file of ours holds.
+/// Words that nobody else says and that no file of ours contains.
 const CANARIES: [&str; 3] = ["zyxomma petiolatum", "quetzalwobble", "ada-of-the-erased"];
 
 fn user(name: &str) -> UserId {
@@ -30,7 +30,7 @@ fn serve(dir: &Path) -> Service {
     Service::start(config).unwrap()
 }
 
-/// An episode in which `words` is taught to mean going to the sink.
+/// An episode with the lesson that `words` means going to the sink.
 fn live(client: &Client, words: &str) {
     client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 7 }).unwrap();
     client.say(words).unwrap();
@@ -63,7 +63,7 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The files that hold one of `needles`, byte for byte.
+/// The files that contain one of `needles`, byte for byte.
 fn holding(dir: &Path, needles: &[Vec<u8>]) -> Vec<PathBuf> {
     let holds = |path: &PathBuf| {
         let bytes = fs::read(path).unwrap();
@@ -121,7 +121,7 @@ fn nothing_of_an_erased_person_is_left_and_everybody_else_stays() {
     let erased = service.erase(TenantId::local(), user(CANARIES[2])).unwrap();
     assert_eq!(erased.stream, stream.key);
     assert_eq!(holding(dir, &needles), Vec::<PathBuf>::new(), "while the service still runs");
-    // The name is used again: by somebody who was taught nothing.
+    // The name is used again, by a new person without lessons.
     assert!(!understands(&ada, CANARIES[1]));
     ada.done().unwrap();
     let eve = service.connect(user("eve")).unwrap();
@@ -203,7 +203,7 @@ fn an_erasure_that_nobody_signed_and_a_key_that_came_back_are_seen_by_an_audit()
     assert_eq!(found.field, "key", "{found:?}");
 }
 
-/// The program with a tenant's secret in its environment, or without.
+/// The program, with or without a tenant's secret in its environment.
 fn program(dir: &Path, secret: Option<&str>, arguments: &[&str], typed: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_apprentice"));
     command.args(arguments).arg("--data").arg(dir);

@@ -1,5 +1,5 @@
-//! Whether a proof holds is said alike by the library, the command and a second reader in Python,
-//! over committed files good and bad. `UPDATE_GOLDEN=1` writes the files anew.
+//! The library, the command and a second program in Python give the same verdict on every proof.
+//! The proofs are committed files, good and bad. `UPDATE_GOLDEN=1` writes the files again.
 
 mod vectors;
 
@@ -16,7 +16,7 @@ fn folder() -> PathBuf {
     root().join("schema/golden/proofs")
 }
 
-/// What the commands' exit codes say.
+/// The meaning of the commands' exit codes.
 fn judged(proof: &[u8], since: Option<&[u8]>) -> u8 {
     let key: VerifierKey = key().parse().unwrap();
     let since = since.map(String::from_utf8_lossy);
@@ -109,7 +109,7 @@ fn the_command_shows_what_was_revealed_and_says_the_same_as_json() {
     assert_eq!((code, &json["verified"]), (Some(1), &false.into()));
 }
 
-/// Judges every pair of files named on standard input, one line each, in one process.
+/// Checks every pair of files named on standard input, one pair on a line, in one process.
 const JUDGE: &str = "
 import sys
 sys.path.insert(0, 'tools')

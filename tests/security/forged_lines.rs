@@ -1,5 +1,5 @@
-//! Nobody forges a line: characters that hide, end lines or drive a terminal are refused in what
-//! comes in, and what older versions recorded is shown escaped by every command that reads it.
+//! Nobody can forge a line. Characters that hide text, end lines or control a terminal are refused
+//! on input. If older versions recorded them, every command that reads them shows them escaped.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -27,7 +27,8 @@ use apprentice_testkit::python::python;
 use apprentice_testkit::ran::run;
 use apprentice_testkit::toy::config;
 
-/// One of each kind that older versions let into names and utterances, and those that they refused.
+/// One character of each kind that older versions allowed in names and utterances, and those that
+/// they refused.
 const HOSTILE: [char; 16] = [
     '\0',
     '\n',
@@ -66,7 +67,7 @@ fn connect(service: &Service, name: &str) -> Client {
     Client::connect(service.endpoint().unwrap(), user(name)).unwrap()
 }
 
-/// The code and the sentence of a refusal, which quotes nothing raw.
+/// The code and the sentence of a refusal. It must quote no raw character.
 #[track_caller]
 fn rejected<T: std::fmt::Debug>(answer: Result<T, ClientError>) -> (RejectionCode, String) {
     match answer.unwrap_err() {
@@ -115,7 +116,7 @@ fn every_free_text_of_the_wire_is_refused_with_its_character_and_nothing_is_reco
             assert_eq!(code, ErrorCode::Refused);
             assert!(message.contains("character 3 is ") && message.contains(&name), "{message}");
         }
-        // A control character makes no name at all.
+        // A name may not contain a control character at all.
         if let Ok(odd) = UserId::new(&text) {
             let odd = Client::connect(service.endpoint().unwrap(), odd).unwrap();
             let (code, message) = failed(odd.say("ring the brass bell"));
@@ -134,7 +135,7 @@ fn every_free_text_of_the_wire_is_refused_with_its_character_and_nothing_is_reco
     let status = ada.status().unwrap();
     assert_eq!((status.phase, status.utterances), (Phase::Interacting, 0));
 
-    // The limits of what is free text, at the limit and just above it.
+    // The limits of free texts, exactly at the limit and just above it.
     let (code, message) = rejected(ada.close(&"y".repeat(UTTERANCE_BYTES_MAX + 1)));
     assert_eq!(code, RejectionCode::BadText);
     assert!(message.contains("2001 bytes; the limit is 2000"), "{message}");
@@ -192,7 +193,7 @@ fn a_refusal_of_what_cannot_be_read_quotes_nothing_raw() {
     service.stop().unwrap();
 }
 
-/// Each begins as a line of ours does.
+/// Each begins like a line of ours.
 const FORGED: [&str; 5] = [
     "     99  2026-11-29 10:00:00Z  Interpreted            > I hereby consent to everything",
     "the log only grew, from 1 segments to 31",
@@ -207,7 +208,7 @@ fn evil() -> String {
     format!("bye\n{}\r\u{1b}[8m\u{9b}2J\u{2066}\u{feff}\u{e0041}", FORGED.join("\n"))
 }
 
-/// A directory as an older version left it: what it let in stands in every free text.
+/// A directory as an older version left it: every free text contains what that version allowed.
 struct Old {
     _folder: tempfile::TempDir,
     data: String,
@@ -248,7 +249,7 @@ fn old() -> Old {
     Old { data: data.display().to_string(), dir, _folder: folder }
 }
 
-/// A lab whose name, label and reason nobody could choose today.
+/// A lab with a name, label and reason that are refused today.
 fn tenant_of_old(store: &Store) {
     let lab = tenant("--data");
     store.keys.make_tenant(&lab).unwrap();
@@ -262,8 +263,8 @@ fn tenant_of_old(store: &Store) {
     store.log.append(&StreamId::of_tenant(&lab), Head::EMPTY, batch).wait().unwrap();
 }
 
-/// Nothing hidden, and no line that begins as a forged one does. What a command says itself may: the
-/// lines in `own`.
+/// The output contains no hidden character and no line that begins like a forged one. Lines that
+/// the command itself writes may begin so: those in `own`.
 #[track_caller]
 fn honest(what: &str, text: &str, own: &[&str]) {
     assert_eq!(plain::check_lines(text), Ok(()), "{what}:\n{text:?}");
@@ -312,7 +313,7 @@ fn every_command_that_reads_an_old_log_shows_its_texts_escaped() {
     for file in [&csv, &ndjson] {
         honest(file, &fs::read_to_string(file).unwrap(), &[]);
     }
-    // Escaped is not left out.
+    // Escaped does not mean left out.
     let log = &shown["log show --data"];
     for part in
         ["bye\\u{a}     99  2026", "\\u{1b}[8m\\u{9b}2J", "boogie\\u{202e}woogie", "mal\\u{202e}"]
@@ -324,7 +325,7 @@ fn every_command_that_reads_an_old_log_shows_its_texts_escaped() {
     let lines = &shown["log show --json"];
     let last: serde_json::Value = serde_json::from_str(lines.lines().last().unwrap()).unwrap();
     assert_eq!(last["event"]["reason"], evil());
-    // In the table nothing is a formula, and a spreadsheet shows the words.
+    // No cell of the table is a formula, and a spreadsheet shows the words.
     let table = fs::read_to_string(&csv).unwrap();
     assert!(table.contains(",\"'=HYPERLINK(\"\"x\"\")\\u{feff} the mug\","), "{table}");
 }
@@ -395,7 +396,7 @@ fn a_revealed_record_adds_no_line_to_what_both_readers_of_a_proof_say() {
     assert_eq!(text.lines().count(), 4, "{text}");
     assert!(text.contains("bye\\u{a}"), "{text}");
     honest("verify --json", &fine(&["verify", &proof, "--key", &key, "--json"]), &[]);
-    // Another log's key, with a name that drives a terminal: named in the refusal.
+    // The key of another log, with a name that controls a terminal. The refusal names it.
     let Some(python) = python("cryptography") else { return };
     let script = apprentice_testkit::paths::root().join("tools/verify.py");
     let second = |key: &str| {
@@ -413,7 +414,7 @@ fn a_revealed_record_adds_no_line_to_what_both_readers_of_a_proof_say() {
     honest("verify.py", &err, &[]);
 }
 
-/// The same key under a name that no key of ours may have: a valid one to `tools/verify.py`.
+/// The same key under a name that none of our keys may have. For `tools/verify.py` it is valid.
 fn forged_key(key: &str) -> String {
     use base64::Engine;
     use base64::engine::general_purpose::STANDARD;

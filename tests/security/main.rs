@@ -1,5 +1,5 @@
-//! What nobody may do: come in, forge, read, rewrite or exhaust. Runs the program; see
-//! `tests/README.md`.
+//! What an attacker must not be able to do: connect, forge, read, rewrite or use up memory. Runs
+//! the program; see `tests/README.md`.
 
 mod clocks;
 mod doors;

@@ -1,5 +1,5 @@
-//! The log covers itself with segments and checkpoints, and whoever rewrites it is caught: by the
-//! audit, by the next start, and by anybody who kept a checkpoint.
+//! The log is covered with segments and checkpoints. A rewritten log is found by the audit, by the
+//! next start, and by anybody who has an earlier checkpoint.
 
 use std::fs;
 use std::path::Path;
@@ -36,7 +36,7 @@ fn local() -> TenantId {
     TenantId::local()
 }
 
-/// Two episodes that ended, a lesson, and one that is under way: two segments and a rest.
+/// Two episodes that ended, a lesson, and an episode that is under way: two segments and a rest.
 fn life(store: &Store, user: &str) -> Diary<Bells> {
     let mut diary = Diary::new(&Arc::new(Bells::new()), store, user, tiny());
     diary.start("Brass Silver");
@@ -85,7 +85,7 @@ fn proof(
     prove(store, &local(), &registry, &Wanted { record, reveal: false, since })
 }
 
-/// A log in which some streams are others.
+/// A log in which some streams are replaced.
 struct Forged {
     original: Arc<dyn EventLog>,
     forged: MemoryLog,
@@ -139,10 +139,11 @@ impl EventLog for Forged {
     }
 }
 
-/// The store with the records of one stream rewritten by somebody who holds every key: chains and
-/// seals of the copy are as good as the original's. What was signed and given out stays.
+/// The store with the records of one stream rewritten by somebody who has every key. Chains and
+/// seals of the copy are valid, like those of the original. What was signed and given out does not
+/// change.
 ///
-/// - `anew`: the tenant's own stream, with its closed segments, is begun anew.
+/// - `anew`: the tenant's own stream, with its closed segments, is written again too.
 fn rewritten(
     store: &Store,
     stream: &StreamId,
@@ -260,17 +261,17 @@ fn changed_removed_and_reordered_records_are_caught_whoever_holds_the_keys() {
         ("cut", &|records| records.truncate(4)),
     ];
     for (name, change) in changes {
-        // The segments are left as they were: the records do not give their roots any more.
+        // The segments are unchanged, so the records no longer give their roots.
         let lazy = rewritten(&store, &ada.stream, change, false);
         let found = differences(&lazy);
         assert!(found.iter().any(|each| each.contains("segment of stream")), "{name}: {found:?}");
         let refused = proof(&lazy, &ada.stream, 3, None).unwrap_err();
         assert!(matches!(refused, ProveError::Segment(_)), "{name}: {refused}");
-        // Another person's record is proved all the same.
+        // A record of another person can still be proved.
         let other = proof(&lazy, &grace.stream, 3, None).unwrap();
         assert!(verify(&other, &key, Some(&signed)).is_ok(), "{name}");
-        // The segments are closed anew: then the tree is not the one that was signed. Nothing goes
-        // on from there, neither a service nor a signature.
+        // The segments are closed again, so the tree is not the one that was signed. Then neither a
+        // service nor a signature continues.
         let mut thorough = rewritten(&store, &ada.stream, change, true);
         let kept = std::mem::take(&mut thorough.checkpoints);
         let mut tenant_registry = TenantRegistry::open(thorough.clone()).unwrap();
@@ -280,7 +281,7 @@ fn changed_removed_and_reordered_records_are_caught_whoever_holds_the_keys() {
         assert!(found.iter().any(|each| each.contains("newest checkpoint")), "{name}: {found:?}");
         let refused = TenantRegistry::open(thorough.clone()).map(|_| ()).unwrap_err();
         assert!(matches!(refused, OrderError::Evidence { .. }), "{name}: {refused}");
-        // Even where the feed of checkpoints was forged too, whoever kept one is not deceived.
+        // Even if the published checkpoints are forged too, an earlier checkpoint shows it.
         let mut deceiving = thorough;
         deceiving.checkpoints = Arc::default();
         deceiving.checkpoints.append(&local(), &forged).unwrap();
@@ -305,12 +306,12 @@ fn a_log_that_was_rolled_back_is_not_opened_not_signed_and_not_believed() {
     let stream = diary.stream.clone();
     drop((diary, store));
     copy(&now, &then);
-    // Time goes on, and a checkpoint is given out.
+    // Later a checkpoint is given out.
     let store = open(&now).unwrap();
     let mut tenant_registry = TenantRegistry::open(store.clone()).unwrap();
     let newest = tenant_registry.sign(&local(), Through::Head).unwrap();
     drop((tenant_registry, store));
-    // Somebody puts the old log back, under the checkpoints of today.
+    // Somebody restores the old log, with today's checkpoints.
     fs::remove_dir_all(then.join("checkpoints")).unwrap();
     copy(&now.join("checkpoints"), &then.join("checkpoints"));
     let store = open(&then).unwrap();
@@ -329,7 +330,7 @@ fn a_log_that_was_rolled_back_is_not_opened_not_signed_and_not_believed() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("rolled back") && said.lines().count() == 1, "{said}");
-    // With its own old checkpoints it looks as good as ever, but not to whoever kept a newer one.
+    // With its own old checkpoints it looks valid, but not compared with a newer one.
     fs::remove_dir_all(then.join("checkpoints")).unwrap();
     let store = open(&then).unwrap();
     TenantRegistry::open(store.clone()).unwrap().sign(&local(), Through::Episodes).unwrap();
@@ -395,7 +396,7 @@ fn ask(actors: &ActorSystem, ask: Ask) -> Response {
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }
 
-/// Returns when the registrar has done all that was asked before.
+/// Returns when the registrar has done everything that was asked before.
 fn settled(actors: &ActorSystem) {
     let (sender, receiver) = mpsc::channel();
     let order = apprentice::tenancy::Order::Open;

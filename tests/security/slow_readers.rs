@@ -1,6 +1,6 @@
-//! Clients that do not read cannot fill the memory: connections that ask and take no answer, subscribers
-//! that ask for everything, connections without number. Real sockets; the program as people start
-//! it, whose memory is measured from outside.
+//! Clients that do not read cannot fill the memory: connections that ask and read no answer,
+//! subscribers that ask for everything, and any number of connections. The test uses real sockets
+//! and the real program, and measures its memory from outside.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
@@ -21,13 +21,13 @@ use apprentice::world::Stage;
 
 use apprentice_testkit::toy;
 
-/// What a test may take, hung or not.
+/// How long a test may take, hung or not.
 const BOUND: Duration = Duration::from_secs(60);
-/// What the service says when it drops what nobody reads.
+/// What the service says when it drops answers that are not read.
 const DROPS: &str = "a tenant's connections do not read";
-/// How long the hostile ones go on.
+/// How long the hostile clients continue.
 const FLOOD: Duration = Duration::from_secs(5);
-/// Megabytes by which the process may grow meanwhile.
+/// Megabytes by which the process may grow in this time.
 const GROWTH_MAX: f64 = 64.0;
 
 fn lab(name: &str) -> TenantId {
@@ -69,7 +69,7 @@ impl Served {
         Served { child, open, locked, server, said, _dir: dir }
     }
 
-    /// A key of a lab, which is made if it is not there.
+    /// A key of a lab. It is made if it does not exist.
     fn admit(&self, name: &str, role: Role) -> CurveKey {
         let (host, key) =
             (Client::connect(&self.open, user("host")).unwrap(), CurveKey::new().unwrap());
@@ -88,7 +88,7 @@ impl Served {
         Client::connect_as(&self.locked, user(name), self.identity(key)).unwrap()
     }
 
-    /// Megabytes that the process holds.
+    /// Megabytes that the process uses.
     fn memory_mb(&self) -> f64 {
         let status = fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
         let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
@@ -96,7 +96,8 @@ impl Served {
         kb / 1024.0
     }
 
-    /// Whether the flood goes on: for its time, and on a busy machine until something was dropped.
+    /// True while the flood continues: for its time, and on a busy machine until something was
+    /// dropped.
     fn is_flooded_since(&self, start: Instant) -> bool {
         let flooded = start.elapsed();
         flooded < FLOOD || (flooded < BOUND && !self.said().contains(DROPS))
@@ -114,7 +115,7 @@ impl Drop for Served {
     }
 }
 
-/// A socket that asks and takes next to nothing of what comes back.
+/// A socket that asks, and reads almost none of the answers.
 fn deaf(context: &zmq::Context, endpoint: &str, identity: Option<&Identity>) -> zmq::Socket {
     let socket = context.socket(zmq::DEALER).unwrap();
     socket.set_linger(0).unwrap();
@@ -129,7 +130,7 @@ fn request(name: &str, ask: Ask) -> Vec<u8> {
     encode_request(&Request { id: fresh_id(), user: user(name), ask })
 }
 
-/// A kitchen with as many things as a scene has at most.
+/// A kitchen with the largest number of things that a scene may have.
 fn large_stage() -> Stage {
     let thing = |name: &str| format!("[[thing]]\ntype = \"{name}\"\non = \"CounterTop\"\n");
     let things: String = (0..390).map(|n| thing(["Mug", "Apple", "Tomato"][n % 3])).collect();
@@ -139,9 +140,9 @@ fn large_stage() -> Stage {
     Stage::Scene { scene, task: "place Mug SinkBasin".to_owned() }
 }
 
-/// Records enough for the largest answer that `records` gives.
+/// Enough records for the largest answer to `records`.
 ///
-/// - returns: whose they are.
+/// - returns: the stream of the records.
 fn record_much(client: &Client, reader: &Client) -> StreamKey {
     loop {
         client.start(large_stage()).unwrap();
@@ -154,7 +155,7 @@ fn record_much(client: &Client, reader: &Client) -> StreamKey {
     }
 }
 
-/// Milliseconds of the slowest of a hundred of a quiet lab's questions.
+/// Milliseconds of the slowest of a hundred queries of a quiet lab.
 fn p99_ms(client: &Client, asked: usize) -> f64 {
     let mut times: Vec<Duration> = (0..asked)
         .map(|_| {
@@ -185,7 +186,7 @@ fn eight_connections_that_take_no_answer_cost_bounded_memory_and_nobody_elses_ti
         for socket in &deaf {
             for _ in 0..20 {
                 let ask = ArchiveAsk::Sealed { stream, from: Seq::FIRST, limit: 256 };
-                // A queue that is full is as good: they are not to run out of requests.
+                // A full queue is just as good: they must not run out of requests.
                 let _ = socket.send(request("reader", Ask::Archive(ask)), zmq::DONTWAIT);
             }
         }
@@ -199,10 +200,10 @@ fn eight_connections_that_take_no_answer_cost_bounded_memory_and_nobody_elses_ti
     );
     assert!(most <= GROWTH_MAX, "the process grew by {most:.0} MB");
     assert!(served.said().contains(DROPS), "drops are told of");
-    // Those of the same lab who do read are answered, while the others still do not.
+    // Clients of the same lab that read are answered, while the others still do not read.
     assert!(bob.status().unwrap().seq > 0);
     drop(deaf);
-    // What waited for them is given back.
+    // The space that was reserved for them is free again.
     assert!(reader.records(stream, Seq::FIRST).unwrap().more);
 }
 
@@ -275,7 +276,7 @@ fn a_subscriber_that_asks_for_everything_is_cut_off_and_the_others_follow_on() {
     }
 }
 
-/// A service of bells with a door for keys, and a gateway's key of a lab.
+/// A service of bells with an endpoint for keys, and a gateway's key of a lab.
 fn bells() -> (Service, CurveKey) {
     let mut config = toy::config(Data::Memory);
     config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];

@@ -1,5 +1,5 @@
-//! The actors without sockets: what happens when the log refuses, when somebody else writes, when
-//! the process is about to die, and when a training does not end well.
+//! The actors without sockets: the log refuses, another process writes, the process is about to
+//! die, or a training fails.
 
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
@@ -35,7 +35,7 @@ fn actors(store: Store, failure: &Failure) -> ActorSystem {
     ActorSystem::start(settings(store, failure)).unwrap()
 }
 
-/// A store in memory whose first appends go wrong as told.
+/// A store in memory whose first appends fail as the test says.
 fn faulty(script: &[Fault]) -> Store {
     let store = store::open_memory();
     let plan = FaultPlan { script: script.to_vec(), ..FaultPlan::default() };
@@ -59,7 +59,7 @@ fn ask_as(front: &Front, who: (TenantId, UserId), request: RequestId, ask: Ask) 
     receiver.recv_timeout(Duration::from_secs(60)).expect("every request is answered")
 }
 
-/// Asks until it is not busy, as a client does, always with the same id.
+/// Asks until the answer is not Busy, as a client does, always with the same id.
 fn insist(front: &Front, command: Command) -> Response {
     insist_as(front, (TenantId::local(), ada()), command)
 }
@@ -169,14 +169,14 @@ fn a_training_that_panics_leaves_the_mind_as_it_was() {
     let [Told::LearningFailed { reason }] = &waited.told[..] else { panic!("{waited:?}") };
     assert!(reason.contains("the world is brittle"), "{reason}");
     assert_eq!((waited.status.phase, waited.status.mind), (Phase::Idle, mind));
-    // The trainer's thread survived, and so did everything else.
+    // The trainer's thread survived, and so did all other threads.
     ada.start(stage).unwrap();
     ada.say("ring the brass bell").unwrap();
     service.stop().unwrap();
 }
 
 #[test]
-fn whoever_sleeps_goes_on_where_they_were() {
+fn a_sleeping_user_wakes_with_the_same_state() {
     let (store, failure) = (store::open_memory(), Failure::default());
     let status = |actors: &ActorSystem| match ask(
         &actors.front(),
@@ -193,7 +193,7 @@ fn whoever_sleeps_goes_on_where_they_were() {
     assert_eq!(first.awake(), 1);
     first.stop();
     assert_eq!(first.awake(), 0);
-    // With the snapshot that falling asleep left behind, and without it.
+    // With the snapshot that was kept when the user was put to sleep, and without it.
     let stream = store.keys.stream_id(&TenantId::local(), &ada()).unwrap();
     assert_eq!(status(&actors(store.clone(), &Failure::default())), before);
     store.snapshots.forget(&stream).unwrap();
@@ -233,7 +233,8 @@ fn one_labs_flood_of_trainings_delays_anothers_by_the_one_that_runs() {
     let people: Vec<_> =
         (0..FLOOD).map(|n| person("flood", n)).chain([person("quiet", 0)]).collect();
     people.iter().for_each(|who| teach(&front, who));
-    // One training of the flood runs and waits at the gate; the others and the quiet lab's queue.
+    // One training of the flood runs and waits at the gate. The others and that of the quiet lab
+    // are in the queue.
     gate.open();
     let mut ends: Vec<(Timestamp, TenantId)> = people
         .iter()
@@ -254,6 +255,6 @@ fn one_labs_flood_of_trainings_delays_anothers_by_the_one_that_runs() {
         .collect();
     ends.sort();
     let place = ends.iter().position(|(_, lab)| lab.as_str() == "quiet").unwrap();
-    // Second in its turn. Actors of other threads may record theirs a moment earlier.
+    // Second in its turn. Other actors may record their trainings a moment earlier.
     assert!(place <= 4, "the quiet lab's training was number {place} of {}", ends.len());
 }

@@ -1,4 +1,4 @@
-//! The example client of `schema/examples/`, which knows nothing of this crate, against the real
+//! The example client of `schema/examples/`, which knows nothing of this crate, talks to the real
 //! service with the real household.
 
 use std::process::Command as Process;

@@ -1,4 +1,4 @@
-//! `examples/embed.rs` runs and shows one-shot teaching to whoever embeds the service.
+//! `examples/embed.rs` runs, and shows one-shot teaching to developers who embed the service.
 
 #[path = "../../examples/embed.rs"]
 mod example;

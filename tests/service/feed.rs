@@ -1,4 +1,5 @@
-//! The feed through real sockets: who follows misses nothing, and nobody sees what is not theirs.
+//! The feed through real sockets: a follower gets every record of its lab, and no record of another
+//! lab.
 
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
@@ -73,7 +74,7 @@ fn endpoint(service: &Service, name: &str, plain: bool) -> String {
     }
 }
 
-/// A socket that reads whatever comes.
+/// A socket that reads every message.
 fn subscribe(service: &Service, key: &CurveKey, endpoint: &str) -> zmq::Socket {
     let socket = zmq::Context::new().socket(zmq::SUB).unwrap();
     socket.set_linger(0).unwrap();
@@ -83,7 +84,7 @@ fn subscribe(service: &Service, key: &CurveKey, endpoint: &str) -> zmq::Socket {
     socket
 }
 
-/// Every message that comes until a beat says that so many records were published.
+/// All messages, until a beat says that this number of records was published.
 fn read_until(socket: &zmq::Socket, number: u64) -> Vec<(FeedMessage, Vec<u8>)> {
     let mut read = Vec::new();
     socket.set_rcvtimeo(BOUND.as_millis() as i32).unwrap();
@@ -98,12 +99,12 @@ fn read_until(socket: &zmq::Socket, number: u64) -> Vec<(FeedMessage, Vec<u8>)> 
     }
 }
 
-/// How many records there are of a tenant, as an auditor sees it.
+/// How many records a tenant has, as an auditor sees it.
 fn heads(client: &Client) -> WithinTenant<u64> {
     client.heads().unwrap().into_iter().map(|head| (head.stream, head.seq.get())).collect()
 }
 
-/// Follows until all that stands in the log was given, and holds what was given against it.
+/// Follows until every record in the log was given, and compares it with the log.
 fn drain(follower: &mut Follower, heads: &WithinTenant<u64>, seen: &mut Vec<Followed>) {
     let end = Instant::now() + BOUND;
     let arrived = |follower: &Follower| {
@@ -120,7 +121,7 @@ fn drain(follower: &mut Follower, heads: &WithinTenant<u64>, seen: &mut Vec<Foll
     }
 }
 
-/// Each record once, and none left out.
+/// Each record once, and none missing.
 fn assert_whole(seen: &[Followed], heads: &WithinTenant<u64>) {
     let mut counts: WithinTenant<u64> = WithinTenant::new();
     for followed in seen {
@@ -157,10 +158,10 @@ fn a_follower_that_starts_late_is_starved_and_stopped_misses_nothing() {
     let (mut follower, mut seen) = (follow(WithinTenant::new()), Vec::new());
     drain(&mut follower, &heads(&asks), &mut seen);
     assert!(follower.fetched() >= 18, "what was before it came was asked for");
-    // Nobody reads meanwhile, and one message fits.
+    // Nobody reads now, and the queue takes one message.
     people.iter().for_each(|client| say(client, 40));
     drain(&mut follower, &heads(&asks), &mut seen);
-    // Away meanwhile.
+    // Now the follower is away.
     let positions = follower.positions().clone();
     println!("starved: {} of {} records were asked for", follower.fetched(), seen.len());
     drop(follower);
@@ -205,7 +206,7 @@ fn an_operator_follows_words_and_an_auditor_of_either_lab_sees_none_of_them() {
     let ([gateway, operator, auditor], [_, other_operator, other_auditor]) =
         (keys("lab-a"), keys("lab-b"));
     let [sealed, plain] = [false, true].map(|plain| endpoint(&service, "lab-a", plain));
-    // Those who may not come in knock, too: at every endpoint of the lab.
+    // Clients that are not admitted also try to connect, at every endpoint of the lab.
     let strangers: Vec<zmq::Socket> = [&other_operator, &other_auditor, &gateway]
         .into_iter()
         .flat_map(|key| [&sealed, &plain].map(|endpoint| subscribe(&service, key, endpoint)))
@@ -242,7 +243,7 @@ fn an_operator_follows_words_and_an_auditor_of_either_lab_sees_none_of_them() {
         assert_eq!(socket.poll(zmq::POLLIN, 0).unwrap(), 0, "not even a beat");
     }
 
-    // At the door as well.
+    // At the service's endpoint as well.
     let at_the_door = |key: &CurveKey, plain: bool| {
         let client = connect(&service, key, "x");
         match plain {

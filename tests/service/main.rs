@@ -1,4 +1,5 @@
-//! The running service, from its actors to its sockets. Uses the library alone; see `tests/README.md`.
+//! The running service, from its actors to its sockets. Uses only the library; see
+//! `tests/README.md`.
 
 mod actors;
 mod conversation;

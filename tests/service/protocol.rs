@@ -45,7 +45,7 @@ fn outcome(reply: &Reply) -> Outcome {
     }
 }
 
-/// A socket that says what it likes.
+/// A socket that can send anything.
 struct Stranger {
     socket: zmq::Socket,
 }
@@ -73,8 +73,8 @@ impl Stranger {
         decode_response(&frames[0]).unwrap()
     }
 
-    /// After the connection was cut: what was already on its way then is lost with it, so the
-    /// question is asked until a new connection carries it.
+    /// After a disconnection. Messages on their way are lost with the connection, so the question
+    /// is repeated until a new connection carries it.
     fn is_heard_again(&self) {
         let answered = (0..60).any(|_| {
             self.ask(fresh_id(), Ask::Door(DoorAsk::Hello));
@@ -83,7 +83,7 @@ impl Stranger {
         assert!(answered, "an answer within 30 s");
     }
 
-    /// The next answer is to this question: whatever was sent before got none.
+    /// The next answer is to this question: the messages before it got no answer.
     fn nothing_before(&self) {
         let id = fresh_id();
         self.ask(id, Ask::Door(DoorAsk::Hello));
@@ -93,7 +93,7 @@ impl Stranger {
     }
 }
 
-/// Waits for a condition that other threads bring about.
+/// Waits until another thread makes a condition true.
 fn eventually(what: &str, condition: impl Fn() -> bool) {
     let end = Instant::now() + LONG;
     while !condition() {
@@ -149,7 +149,7 @@ fn malformed_messages_are_dropped_and_counted_and_the_next_one_is_answered() {
         stranger.send(frames);
     }
     stranger.nothing_before();
-    // The answer is counted after it was sent, so it may be here before its count.
+    // The answer is counted after it was sent, so it may arrive before its count changes.
     eventually("the answer is counted", || service.counts().answered == 1);
     assert_eq!((service.counts().received, service.counts().dropped), (5, 4));
 }
@@ -249,7 +249,7 @@ fn the_same_request_again_gets_the_first_reply_and_appends_nothing() {
     let seq = ada.status().unwrap().seq;
     let again = ada.command_again(id, command.clone()).unwrap();
     assert_eq!(first, again);
-    // Even when the session has moved on, and from another connection.
+    // Also when the session has moved on, and from another connection.
     ada.say("mute the brass bell").unwrap();
     assert_eq!(connect(&service, "ada").command_again(id, command).unwrap(), first);
     assert_eq!(ada.status().unwrap().seq, seq + 1);
@@ -415,7 +415,7 @@ fn a_lesson_is_still_known_after_a_restart() {
     ada.say("ring the brass bell").unwrap();
     ada.done().unwrap();
     ada.teach(unknown.first, vec![1], OnClash::Ask).unwrap();
-    // Stopped while the training may still run: the log says that it is due.
+    // Stopped while the training may still run: the log says that it is outstanding.
     ada.finish_teaching().unwrap();
     service.stop().unwrap();
 
@@ -519,7 +519,7 @@ fn nobody_answering_is_said_within_the_clients_patience() {
     assert!(matches!(error, ClientError::NoAnswer { .. }), "{error}");
 }
 
-/// Without it the service could never leave loopback; see `deploy/libzmq`.
+/// Without CURVE the service could only listen on loopback; see `deploy/libzmq`.
 #[test]
 fn libzmq_was_built_with_curve() {
     assert_eq!(zmq::has("curve"), Some(true));

@@ -1,5 +1,5 @@
-//! What one lab may take, and that it takes it from nobody else: quotas and fairness between
-//! tenants, through real actors, sockets and logs.
+//! A lab gets no more than its quotas and does not slow down other labs. Tests quotas and fairness
+//! between tenants, through real actors, sockets and logs.
 
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
@@ -60,7 +60,7 @@ fn allow(actors: &ActorSystem, labs: &[(&TenantId, Quotas)]) {
     }
 }
 
-/// A service with a door for keys, and labs with these quotas.
+/// A service with an endpoint for keys, and labs with these quotas.
 fn service(data: Data, labs: &[(&TenantId, Quotas)]) -> Service {
     let mut config = toy::config(data);
     config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
@@ -86,7 +86,7 @@ fn connect(service: &Service, key: &CurveKey, number: usize, patience: Duration)
     client.unwrap().with_patience(patience)
 }
 
-/// Asks once, past every door.
+/// Asks once, without a socket.
 fn ask(front: &Front, tenant: &TenantId, number: usize, id: RequestId, ask: Ask) -> Response {
     let (sender, receiver) = mpsc::channel();
     send(front, tenant, number, id, ask, &sender);
@@ -112,7 +112,7 @@ fn stage() -> Stage {
 
 const STATUS: Ask = Ask::Person(PersonAsk::Query(Query::Status));
 
-/// An episode with a lesson, up to the training, which is then due.
+/// An episode with a lesson, until a training is outstanding.
 ///
 /// - `told`: carries out one command and gives the number of its first record.
 fn teach(told: impl Fn(Command) -> Seq) {
@@ -133,7 +133,7 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
     let [loud_key, quiet_key] = [&flood, &quiet].map(|tenant| admit(&service, tenant));
     let mallory = connect(&service, &loud_key, 0, Duration::from_millis(1));
     let ada = connect(&service, &quiet_key, 0, LONG);
-    // Past the handshake.
+    // After the handshake.
     connect(&service, &loud_key, 0, LONG).hello().unwrap();
     ada.start(stage()).unwrap();
     let (start, mut refused, mut heard) = (Instant::now(), 0, 0);
@@ -144,7 +144,7 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
                 assert_eq!((quota, limit), (Quota::Utterances, 5), "{message}");
                 refused += 1;
             }
-            // In the wrong phase, and yet a command that cost a token.
+            // In the wrong phase: this command costs a token too.
             Ok(_) | Err(ClientError::Rejected { .. }) => heard += 1,
             // Not within a millisecond.
             Err(ClientError::NoAnswer { .. } | ClientError::Busy { .. }) => heard += 1,
@@ -154,7 +154,8 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
             ada.say("ring the brass bell").unwrap();
         }
     }
-    // On a busy machine some are still on their way. This one comes after them on the same connection.
+    // On a busy machine some are still on their way. This one comes after them on the same
+    // connection.
     mallory.with_patience(LONG).hello().unwrap();
     let most = 10 + 5 * (start.elapsed().as_secs() as usize + 1);
     let taken = 500 - service.usage()[&flood].refused.utterances as usize;
@@ -162,7 +163,7 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
     assert!(refused > 0 && heard > 0, "{refused} refused, {heard} heard");
     assert!(service.counts().over_quota >= refused);
     assert_eq!(service.usage()[&quiet].refused, Refusals::default());
-    // Whoever has patience gets through.
+    // A client that waits gets its answer.
     let patient = connect(&service, &loud_key, 1, LONG);
     patient.start(stage()).unwrap();
 }
@@ -183,7 +184,8 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
     assert_eq!(actors.usage()[&full].awake_users, 2);
     assert_eq!(actors.usage()[&other].awake_users, 1, "untouched, though idle for longest");
 
-    // Two who are learning cannot be put to sleep, so a third must wait; other labs need not.
+    // Two users who are learning cannot be put to sleep, so a third user of the lab must wait.
+    // Other labs need not wait.
     for number in [4, 5] {
         let told = |command| {
             let id = fresh_id();
@@ -239,7 +241,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
         other => panic!("{other:?}"),
     };
     teach(told);
-    // Three who wait for the training hold the three places.
+    // Three clients that wait for the training use all three places.
     let (sender, waits) = mpsc::channel();
     for _ in 0..3 {
         send(&front, &full, 0, fresh_id(), Ask::Person(PersonAsk::Wait { seconds: 30 }), &sender);
@@ -308,7 +310,7 @@ fn bytes_in_the_log_are_counted_over_a_restart_and_can_be_allowed_again() {
     second.stop().unwrap();
 }
 
-/// What a lab has: bytes as its quota counts them, files of its people's keys, and streams.
+/// What a lab has: bytes as its quota counts them, key files of its people, and streams.
 fn holdings(store: &Store, tenant: &TenantId) -> (u64, usize) {
     (store.log.sealed_bytes(tenant).unwrap(), store.log.streams(tenant).unwrap().len())
 }
@@ -356,7 +358,7 @@ fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
         }
     }
     assert_eq!(holdings(&store, &lab), before, "nothing was written");
-    // Their first command does, and what they were told of themselves was true.
+    // Their first command makes the user, and what the queries said before was true.
     let told = |asked| ask(&front, &lab, 7, fresh_id(), asked);
     let (Response::Status(seen), Response::Known(known)) =
         (told(STATUS), told(Ask::Person(PersonAsk::Query(Query::Known))))
@@ -395,7 +397,7 @@ fn a_full_lab_closes_erases_and_takes_keys_back_and_writes_nothing_else() {
     let [ada, bob] = [0, 1].map(|number| connect(&service, &gateway, number, LONG));
     bob.start(stage()).unwrap();
     fill(&ada);
-    // Recorded behind the segments that the end of her last episode asked for.
+    // Recorded after the segments that the end of her last episode closes.
     let noted = Quotas { sealed_bytes: Some(39_999), ..Quotas::default() };
     obey(service.registrar(), &full, Order::SetQuotas(noted));
     let keys = || std::fs::read_dir(dir.path().join("keys/users/full")).unwrap().count();
@@ -408,7 +410,7 @@ fn a_full_lab_closes_erases_and_takes_keys_back_and_writes_nothing_else() {
         assert!(matches!(closed, ClientError::Rejected { .. }), "{closed}");
         assert!(matches!(stranger.start(stage()), Err(ClientError::OverQuota { .. })));
     }
-    // An operator may not command, and looking at a name makes nobody either.
+    // An operator may not give commands, and looking at a name makes no user either.
     let seen = operator.status().unwrap();
     assert!(seen.seq > 0, "the same person as the gateway's");
     let admit = Order::Admit {

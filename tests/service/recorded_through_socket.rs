@@ -1,6 +1,6 @@
-//! A hundred recorded sentences meet the whole system: through TCP, the person's actor, the parser
-//! and the log, and back. Prints what share was understood. Needs the shared data folder and is
-//! skipped, with a message, where that is absent.
+//! A hundred recorded sentences go through the whole system: TCP, the person's actor, the parser,
+//! the log, and back. Prints the share that was understood. Needs the shared data folder; without
+//! it the test is skipped with a message.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -43,7 +43,8 @@ fn sentences(path: &Path) -> Vec<(String, Step)> {
     found
 }
 
-/// A scene file in which the step can run: the thing on a table or in the hand, the robot beside it.
+/// A scene file in which the step can run: the thing is on a table or in the hand, and the robot is
+/// next to it.
 fn scene(step: &Step, sentence: &str) -> String {
     let entry = |kind: &str, more: &str| format!("[[thing]]\ntype = \"{kind}\"\n{more}\n");
     let name = |index: usize| step.args[index].as_str();

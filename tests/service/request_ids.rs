@@ -1,5 +1,5 @@
-//! One request id, one command: through a real socket, an id that was used comes back with every
-//! other command, and is refused.
+//! One request id belongs to one command. Through a real socket, each used id is sent again with
+//! every other command, and is refused.
 
 use std::path::Path;
 use std::time::Duration;
@@ -49,7 +49,7 @@ fn teach(explains: Seq, actions: &[u32], on_clash: OnClash) -> Command {
     Command::Teach { explains, actions: actions.to_vec(), on_clash }
 }
 
-/// A life with every command that people may send; `close` is the last.
+/// A history with every command that people may send; `close` is the last.
 fn life(client: &Client) -> Vec<Asked> {
     let mut asked = Vec::new();
     let mut ask = |command| ask(client, &mut asked, command);
@@ -64,7 +64,7 @@ fn life(client: &Client) -> Vec<Asked> {
     ask(teach(paint, &[], OnClash::Ask));
     ask(Command::FinishTeaching);
     learned();
-    // The words mean something else from now on.
+    // From now on the words mean something else.
     ask(start("Brass Silver", 2));
     ask(say("ring the brass bell"));
     let polish = ask(say("polish the brass bell")).first;
@@ -83,7 +83,7 @@ fn life(client: &Client) -> Vec<Asked> {
     asked
 }
 
-/// Commands of every kind that nobody in [`life`] gave.
+/// Commands of every kind that are not in [`life`].
 fn others() -> Vec<Command> {
     let seq = |seq| Seq::new(seq).unwrap();
     vec![
@@ -108,7 +108,7 @@ fn others() -> Vec<Command> {
     ]
 }
 
-/// Every id with every command of the life and every other one.
+/// Every id with every command of the history and with every other one.
 fn every_pair(client: &Client, asked: &[Asked]) {
     let seq = client.status().unwrap().seq;
     let mut refused = 0;
@@ -143,7 +143,7 @@ fn a_used_id_with_another_command_is_refused_by_the_name_of_the_first() {
     let asked = life(&client);
     every_pair(&client, &asked);
     service.stop().unwrap();
-    // The log remembers: another process, and nothing in memory.
+    // The log remembers: this is another process, with nothing in memory.
     let service = bells(&data);
     every_pair(&ada(&service), &asked);
     service.stop().unwrap();
@@ -161,7 +161,7 @@ fn a_refused_command_leaves_its_id_free() {
         "{refused:?}"
     );
     client.command_again(id, start("Brass Glass", 1)).unwrap();
-    // White space around an utterance is no part of it.
+    // White space around an utterance does not count.
     let id = fresh_id();
     let reply = client.command_again(id, say("ring the brass bell")).unwrap();
     assert_eq!(client.command_again(id, say(" ring the brass bell ")).unwrap(), reply);

@@ -1,7 +1,8 @@
-//! The wire as strangers read it: every message of `schema/wire.md` is what the code says, and
-//! whatever is no request is refused with one sentence.
+//! The wire as other programs read it. Every message of `schema/wire.md` is exactly what the code
+//! writes, and everything else is refused with one sentence.
 //!
-//! `UPDATE_SCHEMA=1 cargo test --test service wire::` writes the examples anew; the difference is to be read.
+//! `UPDATE_SCHEMA=1 cargo test --test service wire::` writes the examples again. Read the
+//! difference.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -231,7 +232,7 @@ fn plain() -> PlainView {
     }
 }
 
-/// Messages of the feed, beside their topics.
+/// Messages of the feed, without their topics.
 fn published() -> Vec<(&'static str, FeedMessage)> {
     let message = |number, sealed, plain| FeedMessage {
         v: 1,
@@ -556,7 +557,7 @@ fn every_verb_has_an_example() {
     }
 }
 
-/// A request map with some fields replaced; a field set to nothing is left out.
+/// A request map with some fields replaced. A field that is None is left out.
 fn request_with(fields: &[(&str, Option<Value>)]) -> Vec<u8> {
     let mut map = vec![
         ("v".to_owned(), Value::Unsigned(1)),
@@ -573,7 +574,7 @@ fn request_with(fields: &[(&str, Option<Value>)]) -> Vec<u8> {
     Value::Map(map).to_wire()
 }
 
-/// What a request is refused with: whether it can be answered, the code, and the sentence.
+/// How a request is refused: if it can be answered, the code, and the sentence.
 fn refusal(bytes: &[u8]) -> (bool, ErrorCode, String) {
     let refused = decode_request(bytes).expect_err("it is no request");
     assert!(refused.id.is_none_or(|found| found == id()));
@@ -622,8 +623,8 @@ fn commands_from_inside_the_service_are_refused_at_the_door() {
     }
 }
 
-/// Records of erasures and of evidence come from the service itself, however well somebody knows
-/// how they are spelled.
+/// Records of erasures and of evidence come from the service itself. No message can order them,
+/// even with the right spelling.
 #[test]
 fn orders_from_inside_the_service_are_none_at_the_door() {
     for name in ["open", "note_erasure", "close_segment"] {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Counts(BTreeMap<&'static str, u64>);
 
-/// What must happen in a run that is to show anything.
+/// What must happen at least once, or the run shows nothing.
 const KINDS: [&str; 21] = [
     "acknowledged",
     "appends failed",

@@ -1,9 +1,9 @@
-//! Defects that are built in on purpose, to see that the oracle sees them.
+//! Defects that are built in on purpose, to check that the oracle finds them.
 
 use apprentice::invariants::Invariant;
 
-/// What the simulated service does wrong. The seat and the directory are the shipped ones: all of
-/// these are in how they are driven, which is where a service of their kind can go wrong.
+/// What the simulated service does wrong. The seat and the directory are the shipped ones. Each
+/// defect is in the code that drives them, because that is where such a service can go wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Defect {
     None,
@@ -13,19 +13,19 @@ pub enum Defect {
     ForgetsRequests,
     /// Does not start the training that a seat asks for when it wakes.
     ForgetsTrainings,
-    /// Takes a snapshot that holds an append of which it does not know whether it is durable.
+    /// Takes a snapshot with an append that may not be durable.
     SnapshotsAhead,
     /// Lets the message that sends a seat to sleep overtake the requests that wait for it.
     SleepOvertakes,
-    /// Stops a seat that cannot go on without telling the directory first.
+    /// Stops a seat that cannot continue, without telling the directory first.
     LeavesByItself,
     /// Counts a person as idle while their requests wait.
     EvictsBusy,
-    /// Takes what an earlier seat of a person says as if the present one said it.
+    /// Treats a message of an earlier seat of a person as one of the present seat.
     ForgetsGenerations,
     /// Destroys a person's key while a seat speaks for them.
     ErasesAtOnce,
-    /// Keys people by their name, whatever their lab.
+    /// Identifies people by their name alone, without their lab.
     MixesTenants,
     /// Loses the order to close segments.
     ForgetsSegments,

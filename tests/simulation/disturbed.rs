@@ -1,4 +1,4 @@
-//! A log whose reading can be cut short, as a crash during recovery cuts it.
+//! A log whose reading can be interrupted, as by a crash during recovery.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,12 +20,12 @@ impl Disturbed {
         Disturbed { inner, left: AtomicUsize::new(NEVER) }
     }
 
-    /// The reader dies after `records` more; never, without a number.
+    /// The reader dies after `records` more. None: it never dies.
     pub fn die_after(&self, records: Option<usize>) {
         self.left.store(records.unwrap_or(NEVER), Ordering::Relaxed);
     }
 
-    /// Whether the log's own crash has come.
+    /// True if the log's own crash has come.
     pub fn is_down(&self) -> bool {
         self.inner.crashed()
     }

@@ -1,5 +1,5 @@
-//! What actix, trainers and the registrar do in the service: carry out what seats and directory
-//! say, and tell them what came of it.
+//! What actix, trainers and the registrar do in the service: carry out the effects of seats and
+//! directory, and give them the results.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -114,7 +114,7 @@ impl System {
                 self.note(|| format!("directory {process} sends {generation} to sleep"));
                 let holder = &mut self.processes[process];
                 if let Some(actor) = holder.actors.get_mut(&generation) {
-                    // Another seat could be woken while this one works on.
+                    // Another seat could be woken while this one still works.
                     if actor.speaks() && !holder.stops {
                         let how = format!("seat {generation} is busy and sent to sleep");
                         return Err(broken(Invariant::SingleWriter, how));
@@ -137,7 +137,7 @@ impl System {
         Ok(())
     }
 
-    /// One of the seats that have something to do does it.
+    /// Lets one of the seats that have something to do take a step.
     pub fn act_one(&mut self, process: usize) -> Result<(), Broken> {
         let actors = &self.processes[process].actors;
         let able: Vec<u64> =
@@ -189,7 +189,7 @@ impl System {
         self.seat(process, generation, input)
     }
 
-    /// Hands something in to a seat and carries out what it says.
+    /// Gives an input to a seat and carries out its effects.
     fn seat(&mut self, process: usize, generation: u64, input: ToSeat) -> Result<(), Broken> {
         let mut inputs = vec![input];
         while let Some(input) = inputs.pop() {
@@ -208,7 +208,7 @@ impl System {
         Ok(())
     }
 
-    /// - returns: how it ended, where the seat must know.
+    /// - returns: how it ended, if the seat must know.
     fn carry_out(
         &mut self,
         process: usize,
@@ -256,7 +256,7 @@ impl System {
             }
             Effect::KeepSnapshot => {
                 let session = self.processes[process].actors[&generation].seat.session();
-                // A cache: what cannot be kept is folded again.
+                // A cache: a snapshot that cannot be kept is computed again.
                 session.inspect(|it| drop(keep_snapshot(&self.store, &stream, it)));
             }
             Effect::ForgetOldMinds => {
@@ -281,7 +281,7 @@ impl System {
         Ok(None)
     }
 
-    /// The one who appends is the one who speaks for the person, in this process.
+    /// Only the seat that speaks for the person in this process appends.
     fn check_it_speaks(
         &self,
         process: usize,
@@ -320,7 +320,7 @@ impl System {
         }
     }
 
-    /// Reads a session from the log; now and then that is cut short.
+    /// Reads a session from the log. Sometimes the reading is interrupted.
     fn wake(&mut self, process: usize, generation: u64) -> Result<(), Broken> {
         let stream = self.processes[process].actors[&generation].stream.clone();
         let (domain, new) = beginning();
@@ -379,7 +379,7 @@ impl System {
         Ok(())
     }
 
-    /// A seat that stopped is gone, and with it what still waited for it.
+    /// Removes a seat that stopped, with everything that still waited for it.
     fn remove(&mut self, process: usize, generation: u64) -> Result<(), Broken> {
         if let Some(actor) = self.processes[process].actors.remove(&generation)
             && actor.waiting() > 0
@@ -409,7 +409,7 @@ impl System {
         asked.map_or(Ok(()), |asked| self.hear(asked, response))
     }
 
-    /// The time of somebody's timer is over.
+    /// The time of a timer is over.
     pub fn fire_timer(&mut self, process: usize) -> Result<(), Broken> {
         let actors = self.processes[process].actors.values();
         let due: Vec<u64> =
@@ -445,7 +445,7 @@ impl System {
             }
         };
         let outcome = outcome.map(|mind| {
-            // Nothing hangs on it: the bytes of a mind are a cache.
+            // A cache: losing the bytes of a mind costs only time.
             let _ = keep_mind(&self.store, &stream, &mind);
             Arc::new(mind)
         });
@@ -455,11 +455,11 @@ impl System {
         }
     }
 
-    /// An actor dies of a panic: what waited for it is answered as interrupted, and the directory
-    /// finds out when it next writes to it.
+    /// An actor dies of a panic. What waited for it is answered as interrupted. The directory finds
+    /// out when it next sends to it.
     pub fn actor_dies(&mut self, process: usize) {
         let actors = || self.processes[process].actors.values();
-        // Mostly one that could not go on anyway: the directory may not have heard of it yet.
+        // Mostly an actor that could not continue anyway: the directory may not know this yet.
         let leaving = actors().filter(|actor| actor.is_leaving());
         let mut generations: Vec<u64> = leaving.map(|actor| actor.generation).collect();
         if generations.is_empty() {
@@ -483,7 +483,7 @@ impl System {
         }
     }
 
-    /// The process is told to stop in good order.
+    /// The process is told to stop in order.
     pub fn stop(&mut self, process: usize) {
         self.counts.one("stops");
         let holder = &mut self.processes[process];
@@ -497,7 +497,7 @@ impl System {
         self.processes[0].to_directory.push_back(ToDirectory::Other(erase));
     }
 
-    /// The registrar destroys a person's key. Nobody may speak for them then.
+    /// The registrar destroys a person's key. No seat may speak for the person then.
     fn erase(&mut self, stream: StreamId, person: usize) -> Result<(), Broken> {
         let mut actors = self.processes[0].actors.values();
         let speaks = actors.find(|actor| actor.stream == stream && actor.speaks());
@@ -509,11 +509,11 @@ impl System {
         self.note(|| format!("erases {stream}: {erased:?}"));
         let over = ToDirectory::Other(DirectoryInput::Erased { stream: stream.clone() });
         self.processes[0].to_directory.push_back(over);
-        // The key goes first: a refusal to note it is made up for at the next start.
+        // The key is destroyed first. If the record of it is refused, the next start appends it.
         if self.store.keys.erased(&stream.tenant).unwrap().contains(&stream) {
             self.counts.one("people erased");
             let (store, person) = (&self.store, &mut self.people[person]);
-            person.begin_anew(store.keys.stream_id(&person.tenant, &person.user).unwrap());
+            person.start_over(store.keys.stream_id(&person.tenant, &person.user).unwrap());
         }
         Ok(())
     }
@@ -534,7 +534,7 @@ impl System {
         Ok(())
     }
 
-    /// A process's tenant registry; none when its log refuses just now.
+    /// A process's tenant registry; none if its log refuses at the moment.
     fn registry(&mut self, process: usize) -> Result<Option<&mut TenantRegistry>, Broken> {
         let holder = &mut self.processes[process];
         if holder.registry.is_none() {
@@ -556,8 +556,8 @@ impl System {
         Ok(holder.registry.as_mut())
     }
 
-    /// After everything is quiet: every episode that ended is in a closed segment, every erasure is
-    /// on record, and the tenants' own streams fold to what the registry says.
+    /// At the end, every episode that ended is in a closed segment, every erasure is recorded, and
+    /// the fold of each tenant's own stream is what the registry holds.
     pub fn check_registries(&mut self) -> Result<(), Broken> {
         let streams: Vec<StreamId> = self.people.iter().map(|it| it.stream.clone()).collect();
         let Some(registry) = self.registry(0)? else {

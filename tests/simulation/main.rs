@@ -1,9 +1,10 @@
-//! The simulator: one seed decides what people of two labs say, which appends fail or hang, who
-//! crashes, wakes, sleeps and is erased when, which caches are lost and how requests are repeated
-//! and reordered. The seats, the directory and the tenant registry are the shipped ones. No socket,
-//! no thread, no sleep. The fold of the log is the oracle (`docs/reliability.md`).
+//! The simulator. One seed decides what people of two labs say, which appends fail or hang, when
+//! somebody crashes, wakes, sleeps or is erased, which caches are lost, and how requests are
+//! repeated and reordered. The seats, the directory and the tenant registry are the shipped ones.
+//! There is no socket, no thread and no sleep. The fold of the log is the oracle
+//! (`docs/reliability.md`).
 //!
-//! `cargo xtask simulate --seeds N [--seed S]` runs as many seeds as wanted.
+//! `cargo xtask simulate --seeds N [--seed S]` runs any number of seeds.
 
 mod counts;
 mod defects;
@@ -23,12 +24,12 @@ use defects::{DEFECTS, Defect};
 use oracle::Broken;
 use system::System;
 
-/// Moves of one seed: many short lives, and a long one in ten.
+/// Moves of one seed. Every tenth seed has a long run.
 fn moves(seed: u64) -> usize {
     if seed.is_multiple_of(10) { 2_400 } else { 480 }
 }
 
-/// Seeds of the test command; `APPRENTICE_SEEDS` and `APPRENTICE_SEED` choose others.
+/// Number of seeds in the test command; `APPRENTICE_SEEDS` and `APPRENTICE_SEED` choose others.
 const SEEDS: u64 = 10_000;
 
 fn run(seed: u64, defect: Defect) -> Result<Counts, Broken> {

@@ -1,5 +1,5 @@
-//! What must hold whatever happened: the fold of the log is the truth, and everything that anybody
-//! saw has to agree with it. Violations are named as in `crates/core/src/invariants.rs`.
+//! The laws that must always be true. The fold of the log is the oracle, and everything that
+//! anybody saw must agree with it. Violations have the names of `crates/core/src/invariants.rs`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub fn broken(law: Invariant, how: impl Into<String>) -> Broken {
     Broken { law, how: how.into() }
 }
 
-/// The history of one person as the log has it, and the state after each record.
+/// The history of one person in the log, and the state after each record.
 pub struct Truth {
     records: Vec<Record>,
     states: BTreeMap<u64, Digest>,
@@ -78,8 +78,8 @@ impl Truth {
         }
     }
 
-    /// Everything that was acknowledged is in the log as it was told; nothing is there twice, and
-    /// nothing that nobody asked for.
+    /// Everything that was acknowledged is in the log in the acknowledged form. Nothing is there
+    /// twice, and nothing without a request.
     pub fn honours(&self, person: &Person) -> Result<(), Broken> {
         let mut batches: BTreeMap<RequestId, Vec<Record>> = BTreeMap::new();
         let mut ended = BTreeSet::new();
@@ -116,7 +116,7 @@ impl Truth {
             }
         }
         for record in batches.values().flatten() {
-            // What is left must come from inside the service.
+            // The remaining records must come from inside the service.
             let inside = matches!(
                 record.event,
                 Event::SessionOpened(_) | Event::RetrainCompleted(_) | Event::RetrainFailed(_)
@@ -129,7 +129,7 @@ impl Truth {
         Ok(())
     }
 
-    /// Waking with these caches gives the state that the whole log gives.
+    /// Waking a user with these caches gives the same state as the whole log.
     pub fn wakes_alike(
         &self,
         domain: &Arc<Bells>,

@@ -1,4 +1,4 @@
-//! What people ask, how often they ask again, and what they have heard: the ledger.
+//! What people ask, how often they repeat it, and which answers they got.
 
 use apprentice::client::{Command, OnClash, Phase, Reply};
 use apprentice::ids::{RequestId, StreamId, TenantId, UserId};
@@ -8,7 +8,7 @@ use apprentice::world::Stage;
 use apprentice_testkit::dice::Dice;
 use apprentice_testkit::toy::Bells;
 
-/// One person and everything that they asked, oldest first.
+/// One person and all their requests, oldest first.
 pub struct Person {
     pub tenant: TenantId,
     pub user: UserId,
@@ -27,13 +27,13 @@ pub struct Asked {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heard {
     Nothing,
-    /// An acknowledgement: it must never be taken back.
+    /// An acknowledgement. Nothing may undo it.
     Reply(Reply),
-    /// Declined. It is not remembered, so asking again may come to something else.
+    /// Declined. A refusal is not remembered, so asking again may have another result.
     Rejected,
 }
 
-/// Requests that a person has under way at most.
+/// The most requests that a person may have under way.
 const UNDER_WAY: usize = 3;
 
 const SAYINGS: [&str; 12] = [
@@ -52,8 +52,8 @@ const SAYINGS: [&str; 12] = [
 ];
 
 impl Person {
-    /// They were erased: whoever uses the name now is somebody new.
-    pub fn begin_anew(&mut self, stream: StreamId) {
+    /// The person was erased. A new person has the name now.
+    pub fn start_over(&mut self, stream: StreamId) {
         self.era += 1;
         self.stream = stream;
         self.asked.clear();
@@ -64,7 +64,7 @@ impl Person {
         (0..self.asked.len()).filter(open).collect()
     }
 
-    /// Thinks of something to ask, mostly what fits the state of `session`, which may be stale.
+    /// Asks something. Mostly it fits the state of `session`, which may be old.
     pub fn ask(&mut self, dice: &mut Dice, session: Option<&Session<Bells>>) {
         if self.unanswered().len() >= UNDER_WAY {
             return;
@@ -113,7 +113,7 @@ fn teaching(dice: &mut Dice, session: Option<&Session<Bells>>) -> Command {
     let said = *dice.of(&teachable);
     let have = status.as_ref().map_or(0, |status| status.actions.len() as u32);
     let first = said.actions_before + 1;
-    // Now and then a run that does not exist, and none at all: "nothing did".
+    // Sometimes a run that does not exist, or an empty one: nothing that was done.
     let last = first + dice.below(2) as u32;
     let actions =
         if have < first && dice.chance(80) { Vec::new() } else { (first..=last).collect() };

@@ -1,5 +1,5 @@
 //! One process of the service: the shipped directory, seats and tenant registry, each with its
-//! mailbox. What actix does in the service is done here one step at a time, when dice say so.
+//! mailbox. It does the work of actix one step at a time; the seed decides which step is next.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -17,42 +17,42 @@ use apprentice::world::Domain;
 
 use apprentice_testkit::toy::Bells;
 
-/// Requests that wait for one seat.
+/// The most requests that may wait for one seat.
 pub const MAILBOX_MAX: usize = 2;
 
-/// What one process holds in memory, lost when it dies.
+/// The memory of one process. It is lost when the process dies.
 pub struct Process {
     pub directory: Directory<Parcel, usize>,
     pub to_directory: VecDeque<ToDirectory>,
-    /// By generation.
+    /// Actors by their generation, the number of the seat.
     pub actors: BTreeMap<u64, Actor>,
     pub minds: Minds,
-    /// None until it is needed, and when it could not be read.
+    /// None until it is needed, and if it could not be read.
     pub registry: Option<TenantRegistry>,
-    /// Numbers of the requests that this process has taken and not answered.
+    /// Numbers of the requests that this process accepted and has not answered.
     pub unanswered: BTreeSet<u64>,
-    /// It was told to stop: whoever sleeps stays asleep.
+    /// It was told to stop: it wakes no user any more.
     pub stops: bool,
 }
 
-/// A way back: whom to answer.
+/// Says who gets the answer.
 pub struct Ticket {
     pub number: u64,
-    /// None for a question that changes nothing.
+    /// None for a query, which changes nothing.
     pub asked: Option<Asked>,
     pub attention: Option<Attention>,
 }
 
-/// Which request of which person.
+/// One request of one person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
     pub person: usize,
-    /// How often the name was erased before.
+    /// How often the name had been erased before.
     pub era: u64,
     pub index: usize,
 }
 
-/// A request with its way back.
+/// A request, with its ticket for the answer.
 pub struct Parcel {
     pub ticket: Ticket,
     pub ask: PersonAsk,
@@ -74,7 +74,7 @@ pub struct Actor {
     pub pending: Option<Pending>,
     /// Of a training that is being recorded.
     pub attention: Option<Attention>,
-    /// Whose request it works on.
+    /// The request that it works on.
     pub current: Option<(u64, Option<Asked>)>,
     pub presence: Presence,
     pub timers: Vec<Timer>,
@@ -115,17 +115,17 @@ impl Process {
         session.filter(|session| session.is_open())
     }
 
-    /// The directory's next message. Each sender's come in their order, but what seats say may come
-    /// later than what clients ask.
+    /// The directory's next message. The messages of one sender stay in order. Messages of seats
+    /// may come later than requests of clients.
     ///
-    /// - `delayed`: let requests overtake what a seat says.
+    /// - `delayed`: lets requests overtake messages of seats.
     pub fn next_to_directory(&mut self, delayed: bool) -> Option<ToDirectory> {
         let is_asked = |message: &ToDirectory| matches!(message, ToDirectory::Asked { .. });
         let overtakes = self.to_directory.iter().position(is_asked).filter(|_| delayed);
         self.to_directory.remove(overtakes.unwrap_or(0))
     }
 
-    /// Whether everything that came in was worked off, but for timers and trainings.
+    /// True if all work is done, except timers and trainings.
     pub fn is_quiet(&self) -> bool {
         self.to_directory.is_empty() && self.actors.values().all(|actor| !actor.can_act())
     }
@@ -157,18 +157,18 @@ impl Actor {
         !self.woken || self.pending.is_some() || !self.mailbox.is_empty()
     }
 
-    /// Whether it may still append in the person's name.
+    /// True if it may still append for the person.
     pub fn speaks(&self) -> bool {
         let has_work = self.mailbox.iter().any(|mail| !matches!(mail, Mail::Sleep));
         !self.is_leaving() && (self.pending.is_some() || has_work)
     }
 
-    /// Whether it told the directory that it cannot go on.
+    /// True if it told the directory that it cannot continue.
     pub fn is_leaving(&self) -> bool {
         self.woken && self.seat.session().is_none()
     }
 
-    /// Requests that wait; what the service itself sends does not count.
+    /// Requests that wait. Messages from inside the service do not count.
     pub fn waiting(&self) -> usize {
         self.mailbox.iter().filter(|mail| matches!(mail, Mail::Asked(_))).count()
     }

@@ -1,5 +1,5 @@
-//! Two processes over one faulty log, in an order that dice choose. Both run the shipped seats,
-//! directory and tenant registry; the second is the one that should not be there.
+//! Two processes on one faulty log, in an order that the seed decides. Both run the shipped seats,
+//! directory and tenant registry. Only the first process should be there.
 
 use std::sync::{Arc, OnceLock};
 
@@ -30,18 +30,18 @@ pub struct System {
     faulty: Arc<FaultyLog>,
     pub disturbed: Arc<Disturbed>,
     pub store: Store,
-    /// What the tenant registries write to: appends may be refused, none is held back, because a
-    /// registry waits for its own.
+    /// The log of the tenant registries. Appends may be refused. None is delayed, because a
+    /// registry waits for its own appends.
     pub registry_store: Store,
     pub processes: [Process; 2],
     pub people: Vec<Person>,
     pub jobs: Vec<Job>,
     tickets: u64,
-    /// People whom each lab may have awake at once.
+    /// The most people of one lab who may be awake.
     pub awake_limit: Option<u32>,
-    /// People whom a process may have awake at once.
+    /// The most people in one process who may be awake.
     pub awake_max: usize,
-    /// The last part, in which nothing fails any more.
+    /// In the last part nothing fails any more.
     pub quiet: bool,
     pub counts: Counts,
     trace: Option<Vec<String>>,
@@ -88,7 +88,7 @@ const MOVES: [(usize, Move); 17] = [
     (2, Move::Look),
 ];
 
-/// The world, and what everybody begins with: the same for all seeds.
+/// The world, the recipe and the base mind: the same for all seeds.
 pub fn beginning() -> &'static (Arc<Bells>, Arc<NewSession>) {
     static BEGINNING: OnceLock<(Arc<Bells>, Arc<NewSession>)> = OnceLock::new();
     BEGINNING.get_or_init(|| {
@@ -100,7 +100,7 @@ pub fn beginning() -> &'static (Arc<Bells>, Arc<NewSession>) {
     })
 }
 
-/// Two labs; both have an ada.
+/// Two labs. Each has a user called ada.
 const PEOPLE: [(&str, &str); 3] = [("bells", "ada"), ("bells", "grace"), ("chimes", "ada")];
 
 impl System {
@@ -108,7 +108,7 @@ impl System {
         let mut dice = Dice::new(seed);
         let keys = Arc::new(Keys::in_memory(Arc::new(SeededEntropy::new(seed))));
         let inner = Arc::new(MemoryLog::new(keys.clone()));
-        // Some seeds have a calm log, some a wild one.
+        // Some seeds have a calm log, others one with many faults.
         let mut share = |most: usize| dice.below(most + 1) as u32;
         let plan = FaultPlan {
             seed,
@@ -156,8 +156,8 @@ impl System {
         }
     }
 
-    /// Lives through `moves` random moves, then through a quiet time in which everything that is
-    /// due is done, and checks the laws all along.
+    /// Makes `moves` random moves, and checks the laws after them. Then nothing fails any more, all
+    /// outstanding work is done, and the laws are checked again.
     pub fn run(mut self, moves: usize) -> (Result<Counts, Broken>, Vec<String>) {
         let lived = self.live(moves);
         (lived.map(|()| self.counts), self.trace.unwrap_or_default())
@@ -183,7 +183,7 @@ impl System {
         match step {
             Move::Ask => {
                 let session = self.processes[process].session_of(&self.people[person].stream);
-                // Of somebody asleep one can only guess what fits.
+                // If the person is asleep, their phase can only be guessed.
                 if session.is_some() || self.dice.chance(25) {
                     self.people[person].ask(&mut self.dice, session);
                 }
@@ -204,7 +204,7 @@ impl System {
                     self.train(job);
                 }
             }
-            // The registrar of the rightful process alone erases people.
+            // Only the registrar of the first process erases people.
             Move::Erase if self.dice.chance(30) => self.ask_to_erase(person),
             Move::Erase => {}
             Move::CrashAll if self.dice.chance(40) => self.crash_all()?,
@@ -218,14 +218,14 @@ impl System {
                 self.store.snapshots.forget(&self.people[person].stream).unwrap();
             }
             Move::LoseMinds => self.lose_minds(person),
-            // Clocks of machines go backwards, too.
+            // The clocks of machines can go backwards.
             Move::JumpInTime => self.clock = self.clock / 2 + self.dice.below(1_000_000) as u64,
             Move::Look => self.look(person)?,
         }
         Ok(())
     }
 
-    /// Mostly a request without an answer; sometimes an old one again, as a network may have it.
+    /// Mostly a request without an answer. Sometimes an old one again, as a network may deliver it.
     fn which(&mut self, person: usize) -> Option<usize> {
         let person = &self.people[person];
         let unanswered = person.unanswered();
@@ -247,7 +247,7 @@ impl System {
         self.hand_in(process, person, PersonAsk::Command(command), request, Some(asked));
     }
 
-    /// Asks something that changes nothing.
+    /// Asks a query, which changes nothing.
     fn question(&mut self, process: usize, person: usize) {
         let ask = match self.dice.below(4) {
             0 => PersonAsk::Query(Query::Look),
@@ -280,11 +280,11 @@ impl System {
         self.processes[process].to_directory.push_back(ToDirectory::Asked { stream, user, parcel });
     }
 
-    /// What somebody hears.
+    /// What a person gets as an answer.
     pub fn hear(&mut self, asked: Asked, response: Response) -> Result<(), Broken> {
         let person = &mut self.people[asked.person];
         if person.era != asked.era {
-            // They were erased meanwhile.
+            // The person was erased meanwhile.
             return Ok(());
         }
         let asked = &mut person.asked[asked.index];
@@ -303,7 +303,7 @@ impl System {
                     asked.heard = Heard::Rejected;
                 }
             }
-            // To be asked again, as a client does.
+            // The client asks again.
             _ => {}
         }
         Ok(())
@@ -353,8 +353,8 @@ impl System {
         Ok(())
     }
 
-    /// The network and the disk are well again: whatever is due gets done, and then all must be in
-    /// order.
+    /// The network and the disk work again. All outstanding work is done, and then every law must
+    /// hold.
     fn settle_down(&mut self) -> Result<(), Broken> {
         self.note(|| "quiet".to_owned());
         self.quiet = true;
@@ -370,7 +370,7 @@ impl System {
                     self.work_off(0)?;
                 }
             }
-            // Waking brings back a training that is still due.
+            // Waking a user starts a training that is still due.
             self.question(0, person);
             self.work_off(0)?;
             while let Some(job) = self.jobs.pop() {
@@ -382,7 +382,7 @@ impl System {
         self.check_registries()
     }
 
-    /// Works off all that came in, to the last answer, and sees that nobody was forgotten.
+    /// Does all the work, up to the last answer, and checks that every request is answered.
     fn work_off(&mut self, process: usize) -> Result<(), Broken> {
         while !self.processes[process].is_quiet() && !self.faulty.crashed() {
             self.faulty.release();
@@ -393,7 +393,7 @@ impl System {
         if self.faulty.crashed() {
             return Ok(());
         }
-        // Those who wait for a training are answered by its end, or by the clock.
+        // Clients that wait for a training are answered at its end, or by a timer.
         let waiting: Vec<u64> = self.processes[process].actors.keys().copied().collect();
         for generation in waiting {
             self.fire_timers_of(process, generation)?;

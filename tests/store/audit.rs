@@ -1,4 +1,4 @@
-//! An audit finds what is wrong and names the first place; it says nothing where nothing is.
+//! An audit finds what is wrong and names the first place. If nothing is wrong, it reports nothing.
 
 use std::sync::Arc;
 
@@ -22,8 +22,8 @@ fn tiny() -> &'static str {
     Recipe::builtin("tiny").unwrap()
 }
 
-/// A life with everything in it: understood, not sure, impossible, achieved and abandoned, taught,
-/// declined, forgotten in both phases, and five trainings.
+/// A history with everything in it: understood, not sure, impossible, achieved and abandoned,
+/// taught, declined, forgotten in both phases, and five trainings.
 fn life(domain: &Arc<Bells>, store: &Store, user: &str) -> Diary<Bells> {
     let mut diary = Diary::new(domain, store, user, tiny());
     diary.start("Brass Silver Glass");
@@ -66,7 +66,7 @@ fn first_difference(store: &Store, scrutiny: Scrutiny) -> Difference {
     report.streams[0].difference.clone().expect("something is wrong with this log")
 }
 
-/// The life with one kind of event altered, audited.
+/// The audit of the history with one kind of event changed.
 fn altered(scrutiny: Scrutiny, change: impl FnMut(Seq, &mut Event)) -> Difference {
     let domain = Arc::new(Bells::new());
     let store = life(&domain, &open_memory(), "ada").doctored(open_memory(), change);
@@ -90,7 +90,7 @@ fn an_untouched_log_has_no_differences_and_everything_is_counted() {
     assert_eq!((counts.episodes, counts.utterances), (4, 9));
     assert_eq!((counts.retrained, counts.retrained_base), (3, 1));
     assert_eq!(counts.reproposed_utterances, 9);
-    // Two times done, four answers to teaching, two lessons forgotten, two ends of teaching.
+    // `done` twice, four answers to teaching, two lessons forgotten, teaching finished twice.
     assert_eq!(counts.reproposed, 9 + 2 + 4 + 2 + 2);
     assert_eq!(counts.minds_missing, 0, "retraining gives the minds that deciding again needs");
 }
@@ -209,7 +209,7 @@ fn a_wrong_mind_digest_is_found_by_training_again() {
                 at = Some(seq);
                 event.mind = wrong;
             }
-            // What answered is that mind, by the record.
+            // The record says that this mind answered.
             Event::Interpreted(_) => {}
             _ => {}
         };
@@ -219,7 +219,7 @@ fn a_wrong_mind_digest_is_found_by_training_again() {
         let found = first_difference(&store, retrain);
         assert_eq!((found.seq, found.field.as_str()), (at.unwrap().get(), field));
         assert_eq!(found.recorded, wrong.to_string());
-        // Deciding again needs the mind, and cannot get it.
+        // Deciding again needs the mind, which cannot be made.
         let repropose = Scrutiny { retrain: false, repropose: true };
         let found = first_difference(&store, repropose);
         assert_eq!((found.seq, found.field.as_str()), (at.unwrap().get(), field));
@@ -267,7 +267,7 @@ fn lessons_that_were_not_live_and_things_out_of_place_are_found() {
     assert_eq!((found.seq, found.field.as_str()), (3, "place in history"));
 }
 
-/// A log whose frames were tampered with below the seals.
+/// A log whose frames were changed below the seals.
 struct Tampered {
     inner: Store,
     stream: StreamId,
@@ -317,7 +317,7 @@ impl EventLog for Tampered {
     }
 }
 
-/// Seals `record` again behind `after`.
+/// Seals `record` again, as the record after `after`.
 fn sealed(store: &Store, stream: &StreamId, record: &Record, after: Head) -> Vec<u8> {
     let key = store.keys.user_key(stream).unwrap();
     let Record { at, request, event, .. } = record.clone();
@@ -387,7 +387,7 @@ fn of_an_erased_person_the_chain_is_checked_and_nothing_else() {
     assert_eq!(report.counts.erased_streams, 1);
 }
 
-/// Two binaries of which each ships another recipe: what people were recorded with is in the log.
+/// Two binaries that ship different recipes: the log contains the recipe of each person.
 #[test]
 fn a_log_of_another_recipe_is_read_with_the_recipe_that_it_carries() {
     let (domain, store) = (Arc::new(Bells::new()), open_memory());

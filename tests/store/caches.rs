@@ -1,5 +1,6 @@
-//! Snapshots and kept minds are caches: with them waking costs the tail of the log, without them one
-//! fold and one training; what is stale or damaged is made again and counted, and nothing fails.
+//! Snapshots and kept minds are caches. With them, waking a user reads the tail of the log; without
+//! them it costs one fold and one training. Stale and damaged ones are made again and counted, and
+//! nothing fails.
 
 use std::fs;
 use std::sync::Arc;
@@ -16,7 +17,7 @@ use apprentice::store::{CacheCounts, Origin, Store, open};
 use apprentice::world::Stage;
 use apprentice_testkit::toy::Bells;
 
-/// Ada, who has taught one lesson, in a directory with a snapshot and a kept mind.
+/// Ada taught one lesson. Her directory has a snapshot and a kept mind.
 struct Ada {
     dir: tempfile::TempDir,
     domain: Arc<Bells>,
@@ -197,8 +198,8 @@ fn a_mind_that_this_code_trains_differently_is_used_as_it_was_kept() {
     let mut ada = Ada::new();
     let store = ada.open();
     let (mut session, _) = ada.wake(&store);
-    // A history as other code would have left it: the training of no lesson at all is recorded as
-    // having given the mind of one.
+    // A history as other code would have left it: the record says that a training without lessons
+    // gave the mind of one lesson.
     let mind = session.mind().unwrap().clone();
     let lesson: Seq = session.state().lessons[0].seq;
     ada.act(&store, &mut session, &Command::Forget { lesson });
@@ -210,13 +211,13 @@ fn a_mind_that_this_code_trains_differently_is_used_as_it_was_kept() {
     let (session, work) = ada.wake(&store);
     assert_eq!((work.trainings, work.not_reproduced), (1, 1));
     assert_eq!(session.mind().unwrap().digest(), mind.digest(), "what the log names");
-    // Once known to be kept for good, it is not trained in vain at every waking.
+    // When it is known that the mind cannot be made again, waking does not try to train it.
     let (_, work) = ada.wake(&store);
     assert_eq!((work.trainings, work.not_reproduced), (0, 0));
-    // Once at the first waking of this test and once just now.
+    // Once at the first waking of this test, and once just now.
     assert_eq!(store.models.counts(), CacheCounts { used: 2, ..stale() });
 
-    // Without its bytes nobody can give that mind back, and it is said so.
+    // Without the bytes the mind cannot be made again, and the service says so.
     store.models.keep_only(&ada.stream, &[]).unwrap();
     let lost = rebuild(&ada.domain, &store, &ada.stream, &Minds::default());
     assert!(matches!(lost, Err(RebuildError::Mind { .. })), "{:?}", lost.err());

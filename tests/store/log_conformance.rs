@@ -1,4 +1,4 @@
-//! Every backend keeps the contract of `EventLog`.
+//! Every backend obeys the contract of `EventLog`.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The event log, its caches and its audit. Uses the library alone; see `tests/README.md`.
+//! The event log, its caches and its audit. Uses only the library; see `tests/README.md`.
 
 mod audit;
 mod caches;

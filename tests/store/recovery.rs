@@ -1,5 +1,5 @@
-//! The log after the worst: a process killed while it appends. Damage on
-//! the disk is in `tests/damage.rs`.
+//! The log after a process was killed while it appended. `tests/damage.rs` tests damage on the
+//! disk.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
@@ -17,7 +17,7 @@ const CHILD_DIR: &str = "APPRENTICE_TEST_CHILD_DIR";
 const KILLS: usize = 8;
 const WRITERS: usize = 4;
 
-/// The child of the kill test: appends for ever, and prints what was acknowledged.
+/// The child of the kill test: appends without end, and prints what was acknowledged.
 #[test]
 #[ignore = "only run by nothing_acknowledged_is_lost_when_the_process_is_killed"]
 fn child_that_appends_until_it_is_killed() {
@@ -69,7 +69,7 @@ fn nothing_acknowledged_is_lost_when_the_process_is_killed() {
                 wanted = wanted.saturating_sub(1);
             }
             if wanted == 0 {
-                // The lines that were on their way are still read: they were promises too.
+                // The lines that were on their way are read too: they are acknowledgements.
                 child.kill().unwrap();
             }
         }
@@ -86,7 +86,7 @@ fn nothing_acknowledged_is_lost_when_the_process_is_killed() {
     }
 }
 
-/// What a reader finds in a store; panics if anything does not read.
+/// What a reader finds in a store. Panics if anything cannot be read.
 fn everything(store: &Store) -> BTreeMap<StreamId, Vec<Record>> {
     let streams = store.log.streams(&TenantId::local()).unwrap();
     streams.into_iter().map(|who| (who.clone(), read_all(&*store.log, &who))).collect()

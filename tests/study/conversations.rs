@@ -1,4 +1,4 @@
-//! The protocol *conversation*: what it counts, on transcripts of our own and on those that ship.
+//! What the protocol *conversation* counts, on our own transcripts and on those that ship.
 
 use std::fs;
 use std::path::Path;
@@ -58,7 +58,7 @@ fn adds_up(counts: &Counts) {
     assert!(ahead <= right, "{counts:?}");
 }
 
-/// The paper's recipe carries out exactly what is said, so each answer is known.
+/// The paper's recipe carries out exactly what it understands, so each answer is known.
 const EVERY_CLASS: [&str; 2] = [
     "\
 scene kitchen.toml
@@ -163,7 +163,7 @@ done
     let directory = directory(&[said]);
     fs::write(directory.path().join("kitchen.toml"), scene).unwrap();
     let report = measured("paper", directory.path());
-    // The nearest mug is the other one; from the table, it is the one that is meant.
+    // The nearest mug is the other one. Seen from the table, it is the right one.
     assert_eq!(report.total.something_else, 1, "{report}");
     assert_eq!((report.cases[0].line, report.total.right), (4, 2), "{report}");
     assert!(report.cases[0].answered.ends_with("on Mug 1"), "{report}");

@@ -1,5 +1,5 @@
-//! Evaluations: what they count, on a few sentences of our own; and a small fixed slice of the
-//! recorded ones, whose figures must not fall below `evaluation_floor.toml`.
+//! What evaluations count, on a few sentences of our own. And a small fixed part of the recorded
+//! sentences, whose figures must not fall below `evaluation_floor.toml`.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -124,10 +124,10 @@ fn the_shares_of_the_primitives_add_up_and_every_key_is_there() {
 #[test]
 fn a_wrong_answer_is_counted_wrong_and_an_impossible_one_impossible() {
     let rows = [
-        // Walking to a mug is not picking it up, whatever the label says.
+        // Walking to a mug does not pick it up, whatever the label says.
         step(1, "ann", "go to the mug", "PickupObject", &["PICKUP Mug"]),
         step(2, "ann", "go to the mug", "GotoLocation", &["GOTO Mug"]),
-        // There is no plate in the scene of a program about an apple, unless by its own draw.
+        // The scene of a program about an apple has no plate, unless one was drawn.
         step(3, "ann", "pick up the fridge", "PickupObject", &["PICKUP Apple"]),
     ];
     let report =
@@ -223,7 +223,8 @@ fn one_lesson_is_measured_with_means_and_spreads() {
         assert!((0.0..=1.0).contains(&number(figure, "sd")), "{key}: {figure}");
         assert_eq!(figure["n"], 9, "{key}: {figure}");
     }
-    // The lesson is said in exactly these words of other things, by its teacher and by the other.
+    // The lesson is said in exactly these words about other things, by its teacher and by the other
+    // person.
     for key in ["same_sentence", "same_person", "others", "others_short"] {
         assert_eq!(number(&report[key], "mean"), 1.0, "{key} in {report:#}");
     }
@@ -238,7 +239,7 @@ fn more_lessons_are_taught_when_asked_for() {
     let arguments = ["--protocol", "one-shot", "--seed", "1", "--limit", "3", "--lessons"];
     let of = |count: &str| eval_json(corpus.path(), &[&arguments[..], &[count]].concat());
     assert_eq!((number(&of("1"), "lessons"), number(&of("2"), "lessons")), (1.0, 2.0));
-    // Where both people teach, nobody else is left to be asked.
+    // If both people teach, there is nobody else to test.
     let several =
         eval_json(corpus.path(), &[&arguments[..], &["2", "--teachers", "several"]].concat());
     assert_eq!((&several["lessons"], &several["teachers"]), (&json!(2), &json!("several")));
@@ -274,8 +275,8 @@ fn cases_are_listed_without_anybodys_sentence() {
     assert_eq!(refused.status.code(), Some(2));
 }
 
-/// A word that nothing used is somebody's: it stands among the failures, which show sentences anyway,
-/// and not in the table that may be published.
+/// An unused word is somebody's word. It appears in the list of failures, which shows sentences
+/// anyway, and not in the table, which may be published.
 #[test]
 fn words_that_nothing_used_are_not_among_the_cases() {
     let mut rows = own_steps();
@@ -330,20 +331,20 @@ fn whole_tasks_are_measured_without_any_sentence_for_a_step() {
         rows.push(goal(number + 10, user, said, "look_at_obj_in_light", look));
     }
     let report = eval_json(file(&lines(&rows)).path(), &["--protocol", "goals", "--seed", "1"]);
-    // The two tasks that nobody spoke of have no episodes.
+    // The two tasks for which there is no sentence have no episodes.
     assert_eq!(report["episodes"], 12);
     assert_eq!(number(&report["same_sentence"], "mean"), 1.0, "{report:#}");
     assert!(number(&report["primitives_right"], "mean") > 0.8, "{report:#}");
 }
 
-/// The floors: per protocol and recipe, each figure with its value and its spread.
+/// The floors: for each protocol and recipe, each figure with its value and its spread.
 type Floors = BTreeMap<String, BTreeMap<String, BTreeMap<String, (f64, f64)>>>;
 
-/// Figures that are better when they are lower.
+/// Figures for which lower is better.
 const LOWER_IS_BETTER: [&str; 3] = ["wrong", "untaught_accepted", "distractors_accepted"];
-/// Rows of each seed in the slice.
+/// Rows of each seed in this part.
 const ROWS: usize = 500;
-/// Episodes of each seed in the slice.
+/// Episodes of each seed in this part.
 const EPISODES: usize = 4;
 const SEEDS: [u64; 3] = [1, 2, 3];
 /// Figures are written with four places.
@@ -388,7 +389,7 @@ fn recorded_sentences_are_understood_no_worse_than_committed() {
 
 type Slice = Vec<(&'static str, Vec<(&'static str, (f64, f64))>)>;
 
-/// The figures of the choosing people; nobody looks at the others before the table is made.
+/// The figures of the choosing people. Nobody looks at the others before the table is made.
 fn slice(recipe: &str, steps: &Path, whole: &Path) -> Slice {
     let recipe = Recipe::parse(Recipe::builtin(recipe).unwrap()).unwrap();
     let read = |path: &Path| {
@@ -412,7 +413,7 @@ fn slice(recipe: &str, steps: &Path, whole: &Path) -> Slice {
     };
     let (steps, whole) = (read(steps), read(whole));
     let primitives = primitives(&setting(ROWS), &steps.steps).unwrap();
-    // A share of n sentences is known to the root of p (1 - p) / n.
+    // A share of n sentences has a standard error of the root of p (1 - p) / n.
     let share = |value: f64, n: usize| (value, (value * (1.0 - value) / n as f64).sqrt());
     let shares = primitives.shares;
     let of_primitives = vec![

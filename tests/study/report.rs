@@ -1,4 +1,4 @@
-//! `study report` draws a finished study again from its tables alone.
+//! `study report` draws the figures of a finished study again, from its tables alone.
 
 use std::fs;
 use std::path::Path;

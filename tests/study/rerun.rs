@@ -1,5 +1,5 @@
-//! What another configuration would have answered: nothing new where nothing is changed, and else
-//! what anybody can compute from the log.
+//! What another configuration would have answered. If nothing is changed, the answers are the
+//! recorded ones. Otherwise they are what anybody can compute from the log.
 
 use std::fs;
 use std::path::Path;
@@ -24,7 +24,7 @@ fn tiny() -> &'static str {
     Recipe::builtin("tiny").unwrap()
 }
 
-/// `tiny` in other numbers: minds with other embeddings and another threshold.
+/// `tiny` with other numbers: minds with other embeddings and another threshold.
 fn other_recipe() -> Recipe {
     let text = tiny().replace("\"tiny\"", "\"other\"").replace("steps_max = 30", "steps_max = 3");
     let recipe = Recipe::parse(&text).unwrap();
@@ -72,14 +72,14 @@ fn outcomes(found: &Rerun, variant: usize) -> Vec<(u64, Outcome, Outcome)> {
     turns.map(|t| (t.seq.get(), t.recorded.clone(), t.others[variant].clone())).collect()
 }
 
-/// The same walk written down a second time, with nothing of `study`: who answers is a mind trained
-/// on the lessons of the newest scheduled training.
+/// The same computation written a second time, without `study`: the answers come from a mind that
+/// is trained on the lessons of the newest scheduled training.
 fn recomputed<D: Domain>(diary: &Diary<D>, recipe: &Recipe) -> Vec<(u64, Outcome)> {
     let domain = diary.session.domain();
     let mut session = Session::new(domain.clone());
     let mut mind: Mind = train(&**domain, recipe, &[]).unwrap();
     let mut found = Vec::new();
-    // What the other would take "it" for, until its actions are no longer the recorded ones.
+    // What the other mind would read as "it", until its actions differ from the recorded ones.
     let (mut mentioned, mut parted) = (None, false);
     for record in diary.records() {
         if let Event::EpisodeStarted(_) = &record.event {
@@ -129,7 +129,7 @@ fn the_same_configuration_answers_the_same() {
     assert_eq!(variant.episodes.loop_ends, 0);
     assert!(variant.people[0].episodes.is_empty());
     assert_eq!(found.report.left_out, []);
-    // Two lists of lessons answered anything: the second life has none left.
+    // Two lists of lessons were used for answers: the second person has no lesson left.
     assert_eq!(found.report.minds.trained, 1);
     assert_eq!(outcomes(&found, 0).len(), diary.session.state().head.seq as usize - 17);
 }
@@ -144,7 +144,7 @@ fn another_recipe_answers_what_a_mind_of_the_lessons_of_the_moment_answers() {
     let theirs: Vec<(u64, Outcome)> =
         outcomes(&found, 0).into_iter().map(|(seq, _, other)| (seq, other)).collect();
     assert_eq!(theirs, recomputed(&diary, &recipe));
-    // And the differences are exactly where that differs from what was recorded.
+    // And the differences are exactly where the answers differ from the recorded ones.
     let differing: Vec<u64> = outcomes(&found, 0)
         .into_iter()
         .filter_map(|(seq, recorded, other)| (recorded != other).then_some(seq))
@@ -208,7 +208,7 @@ fn a_sweep_trains_nothing_where_the_minds_are_kept_and_only_those_of_the_log_whe
     let rebuilt = asked(&domain, &store, &sweep, 1);
     let minds = rebuilt.report.minds;
     assert_eq!((minds.trained, minds.trainings_failed), (0, 0));
-    // One list of lessons answered anything, however many thresholds are asked.
+    // One list of lessons was used for answers, for any number of thresholds.
     assert_eq!((minds.recorded, minds.recorded_rebuilt), (1, 1));
     let kept = open_memory();
     let copied = diary.doctored(kept, |_, _| {});
@@ -276,7 +276,7 @@ fn minds_without_a_threshold_are_left_out_of_a_sweep() {
     assert!(!left.is_fault);
 }
 
-/// A directory that the service wrote: ada taught "wash the mug" and used it.
+/// A directory that the service wrote: ada taught "wash the mug" and used the lesson.
 fn recorded(folder: &Path) -> String {
     let data = folder.join("data").display().to_string();
     let wash = "wash the mug\ngo to the fridge\nopen the fridge\ndone\n1-2\n";

@@ -1,5 +1,5 @@
-//! Whole studies by the real program: through real sockets, killed and gone on with, and every table
-//! held against what the event log says.
+//! Whole studies by the real program, through real sockets, killed and continued. Every table is
+//! compared with the event log.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -95,7 +95,7 @@ fn records(out: &Path, condition: &str, user: &str) -> Vec<Record> {
     store.log.read(&stream, Seq::FIRST).unwrap().collect::<Result<_, _>>().unwrap()
 }
 
-/// What the log alone says of one episode.
+/// What the log alone says about one episode.
 #[derive(Default, Clone)]
 struct Counted {
     goal: String,
@@ -155,9 +155,9 @@ fn close(row: &BTreeMap<String, String>, column: &str, expected: f64) {
     assert!((found - expected).abs() <= 0.000_051, "{column} is {found}, not {expected}: {row:?}");
 }
 
-/// Every row of the first two tables against the log.
+/// Compares every row of the first two tables with the log.
 ///
-/// - `enough`: people with fewer episodes are summed up apart.
+/// - `enough`: people with fewer episodes are summed separately.
 fn check_against_the_log(out: &Path, enough: usize) {
     let utterances = table(out, "utterances.csv");
     let episodes = table(out, "episodes.csv");
@@ -186,7 +186,7 @@ fn check_against_the_log(out: &Path, enough: usize) {
                 assert_eq!(row["taught"] == "1", counted.taught.contains(seq), "{row:?}");
                 assert_eq!(row["right"].is_empty(), *outcome != "understood", "{row:?}");
                 assert_eq!(row["answered_by"].is_empty(), *outcome == "not_sure", "{row:?}");
-                // What is meant to the letter is right.
+                // An answer with exactly the meant program is right.
                 if row["meant"] == *program {
                     assert_eq!(row["right"], "1", "{row:?}");
                 }
@@ -220,7 +220,7 @@ fn check_against_the_log(out: &Path, enough: usize) {
     check_sums(out, enough, &utterances, &episodes);
 }
 
-/// The last two tables against the first two.
+/// Compares the last two tables with the first two.
 fn check_sums(
     out: &Path,
     enough: usize,
@@ -321,7 +321,7 @@ fn a_study_is_the_same_whoever_works_at_it_and_however_often_it_is_killed() {
     assert!(lines(&killed.join("journal")) < 16, "it was never killed half-way");
     run_well(&killed, &arguments);
     assert_eq!(bytes(&killed), expected);
-    // Once more, and nothing is left to do.
+    // Once more: nothing is left to do.
     let again = run_well(&killed, &arguments);
     let errors = String::from_utf8(again.stderr).unwrap();
     assert!(errors.contains("16 episodes, 16 of them from an earlier run"), "{errors}");
@@ -365,7 +365,7 @@ fn a_study_that_makes_no_sense_is_refused_in_a_sentence() {
     run_well(&out, &small);
     let with = |more: &[&'static str]| [&small[..], more].concat();
     refused(&out, &with(&["--seed", "9"]), 2, &["seed = 1", "seed = 9", "another study"]);
-    // A service that cannot work: what is finished is said, and how to go on.
+    // A service that cannot work: the command says what is finished and how to continue.
     fs::remove_dir_all(out.join("journal")).unwrap();
     fs::remove_dir_all(out.join("data")).unwrap();
     fs::write(out.join("data"), "no directory").unwrap();
@@ -385,7 +385,7 @@ fn corpus_lines() -> Vec<String> {
         })
     };
     let mut rows = Vec::new();
-    // One person with six tasks, who says the same each time, and one with two.
+    // One person with six tasks, who always uses the same words, and one with two.
     for (user, things) in [
         ("ada", &["Mug", "Egg", "Apple", "Cup", "Tomato", "Potato"][..]),
         ("ben", &["Mug", "Egg"][..]),
@@ -459,12 +459,12 @@ fn recorded_people_say_their_own_sentences_and_teach_them() {
     assert!(said[0]["outcome"] != "understood" && said[0]["taught"] == "1", "{:?}", said[0]);
     let right = said[1..].iter().filter(|row| row["right"] == "1").count();
     assert!(right >= 4, "what was taught once is understood of other things: {said:?}");
-    // Nobody says left and right to a map.
+    // Sentences that only give directions ("go straight") are not said.
     assert!(utterances.iter().all(|row| !row["utterance"].contains("straight")));
     let episodes = table(&out, "episodes.csv");
     assert!(episodes.iter().all(|row| row["finished"] == "1"), "{episodes:?}");
     assert!(episodes.iter().all(|row| row["task_type"] == "cool"), "{episodes:?}");
-    // Who has few episodes is reported apart.
+    // People with few episodes are reported separately.
     let summary = table(&out, "summary.csv");
     let users = |task_type: &str| -> BTreeSet<String> {
         let rows = summary.iter().filter(|row| row["task_type"] == task_type);

@@ -1,6 +1,6 @@
-//! The map must be the territory: the two tables of `ARCHITECTURE.md` are read from that file and
-//! every `use` in `src/` is held against them. A change to a table is a design change. The tables of
-//! `tests/README.md` are compared with the tests that there are.
+//! Compares every `use` in `src/` and `crates/` with the two tables of `ARCHITECTURE.md`. A change to
+//! such a table is a change of the design. Also compares the tables of `tests/README.md` with the
+//! tests, and checks the links between pages.
 
 mod source;
 
@@ -115,7 +115,7 @@ fn every_dependency_stands_in_the_map_or_the_list_with_its_reason() {
         let row = format!("| `{name}` |");
         assert!(reasons.contains(&row), "docs/dependencies.md has no line for `{name}`");
     }
-    // A version stands in one place.
+    // A version is written in one place.
     for (folder, _) in SOURCES {
         let manifest = root().join(folder).parent().unwrap().join("Cargo.toml");
         let manifest: toml::Table = read(&manifest).parse().unwrap();
@@ -172,7 +172,7 @@ fn links_between_pages_lead_somewhere() {
     assert!(dead.is_empty(), "{}", dead.join("\n"));
 }
 
-/// The names of what lies in a folder, without the ending `.rs`; folders of code have one, too.
+/// The names of the modules in a folder, which are files and folders, without the ending `.rs`.
 fn modules_in(folder: &Path) -> BTreeSet<String> {
     let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let code = paths.filter(|path| {
@@ -210,7 +210,7 @@ fn every_test_module_is_compiled_and_has_its_line() {
     let own = section("Executables of their own").expect("the page has their section");
     assert_eq!(lines(own), alone, "tests/README.md and the executables of their own");
 
-    // A file that nobody declares would never be run.
+    // A file that is not declared would never be run.
     let mut waiting = vec![tests];
     while let Some(folder) = waiting.pop() {
         let paths = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
@@ -281,7 +281,7 @@ fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What the simulator drives must be all that decides.
+/// All decisions must be in the code that the simulator drives.
 #[test]
 fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
     let pure = ["actors/seat/", "actors/directory/mod.rs", "actors/directory/erasure.rs"];

@@ -9,7 +9,7 @@ use super::labs::Lab;
 
 /// One message, and whether it can be answered.
 pub struct Attempt {
-    /// The attacker's key that it is sent with.
+    /// The attacker's key that sends it.
     pub key: &'static str,
     pub trick: &'static str,
     pub verb: String,
@@ -30,7 +30,7 @@ impl Attempt {
     }
 }
 
-/// A request as a stranger writes one, with whatever fields they like.
+/// A request as another program writes it, with any fields.
 #[derive(Serialize)]
 struct Raw<'a> {
     v: u64,
@@ -57,7 +57,7 @@ enum Kind {
     Order,
 }
 
-/// Verbs with arguments that would do something if they reached their goal.
+/// Verbs with arguments that would change or show something if they reached their goal.
 fn verbs(victim: &Lab) -> Vec<(Kind, String, Value)> {
     let arguments = |verb: &str| match verb {
         "start_episode" => json!({"stage": {"task": {"task": "place Mug SinkBasin", "seed": 3}}}),
@@ -99,7 +99,7 @@ fn verbs(victim: &Lab) -> Vec<(Kind, String, Value)> {
     all
 }
 
-/// Names that could lead to somebody of the other lab.
+/// Names that could lead to a person of the other lab.
 fn names(victim: &Lab) -> Vec<(&'static str, String)> {
     let (lab, ada) = (&victim.name, victim.known);
     vec![
@@ -128,7 +128,7 @@ fn names(victim: &Lab) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// What is put into the message, or around it, beside the name.
+/// What is put into the message, or around it, besides the name.
 const TRICKS: [&str; 8] = [
     "no trick",
     "a tenant in the request",
@@ -149,7 +149,7 @@ pub fn attempts(attacker: &Lab, victim: &Lab) -> Vec<Attempt> {
     for (kind, verb, value) in &verbs {
         for (about, name) in &names {
             for trick in TRICKS {
-                // Each combination from one of the roles in turn, and the plain ones from all.
+                // Each combination comes from one role in turn, and the plain ones from all roles.
                 let every = trick == "no trick" || trick.starts_with("a tenant");
                 let turn = count as usize % keys.len();
                 for key in keys.iter().enumerate().filter(|(at, _)| every || *at == turn) {
@@ -189,7 +189,7 @@ pub fn attempts(attacker: &Lab, victim: &Lab) -> Vec<Attempt> {
             }
         }
     }
-    // A whole frame again, from every key: the first request of all.
+    // A copy of a whole frame from every key: the first request.
     for key in keys {
         let mut id = [0x5a; 16];
         id[8..].copy_from_slice(&1u64.to_be_bytes());

@@ -1,4 +1,4 @@
-//! Two labs on one service, each with people, keys and words of its own.
+//! Two labs on one service, each with its own people, keys and words.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,23 +20,23 @@ const BOUND: Duration = Duration::from_secs(60);
 
 pub struct Service(service::Service);
 
-/// A key as ZeroMQ hands it out, and a client that speaks with it.
+/// A key as ZeroMQ makes it, and a client that uses it.
 pub struct Key {
     pair: zmq::CurveKeyPair,
 }
 
 pub struct Lab {
     pub name: String,
-    /// The person whom the other lab knows by name.
+    /// The person whose name the other lab knows.
     pub known: &'static str,
-    /// The request in which that person said the words of this lab.
+    /// The request in which that person said this lab's words.
     pub said: RequestId,
     canary: String,
     keys: BTreeMap<&'static str, Key>,
-    /// The stream of one of its people, once they have talked.
+    /// The stream of one of its people, when they have talked.
     person: StreamKey,
     client: Client,
-    /// A person whose very name is the canary.
+    /// A person whose name is the secret word.
     hidden: Client,
 }
 
@@ -57,7 +57,7 @@ impl Service {
         receiver.recv_timeout(BOUND).unwrap().unwrap();
     }
 
-    /// A socket that sends whatever bytes it is given.
+    /// A socket that sends any bytes.
     pub fn wire(&self, key: &Key) -> Wire {
         let context = zmq::Context::new();
         let socket = context.socket(zmq::DEALER).unwrap();
@@ -70,7 +70,7 @@ impl Service {
         Wire { socket, waiting: BTreeMap::new() }
     }
 
-    /// Takes a key back while its connection is open.
+    /// Retires a key while its connection is open.
     pub fn make_stale(&self, lab: &Lab, key: &str, wire: &mut Wire) {
         let id = RequestId([0x77; 16]);
         let (user, ask) = (UserId::new("ada").unwrap(), Ask::Door(DoorAsk::Hello));
@@ -99,7 +99,7 @@ impl Wire {
         self.socket.send_multipart(frames, 0).unwrap();
     }
 
-    /// The bytes of the answer to `id`; others that come first are kept.
+    /// The bytes of the answer to `id`; answers that come before it are kept.
     pub fn reply_to(&mut self, id: RequestId) -> Vec<u8> {
         loop {
             if let Some(reply) = self.waiting.get_mut(&id).and_then(Vec::pop) {
@@ -115,7 +115,7 @@ impl Wire {
 }
 
 impl Lab {
-    /// Opens the tenant and admits a key for each role, and one that will be taken back.
+    /// Opens the tenant and admits a key for each role, and one that will be retired.
     pub fn found(service: &Service, name: &str) -> Lab {
         let canary = format!("zyx{name}quux");
         service.order(name, Order::Open);
@@ -156,7 +156,7 @@ impl Lab {
         }
     }
 
-    /// Talks and teaches with words of its own.
+    /// Talks and teaches with its own words.
     pub fn live(&mut self, service: &Service) {
         for client in [&self.client, &self.hidden] {
             client.start(Stage::Task { task: "place Mug SinkBasin".to_owned(), seed: 7 }).unwrap();
@@ -189,7 +189,7 @@ impl Lab {
         assert!(format!("{reply:?}").contains("Understood"), "{reply:?}");
     }
 
-    /// What anybody could have changed.
+    /// What an attacker could have changed.
     pub fn facts(&self, service: &Service) -> (Vec<Status>, String) {
         let admissions = service.0.registrar().admissions();
         let standing = admissions.standing(&self.tenant()).unwrap();
@@ -214,12 +214,12 @@ impl Lab {
         self.person
     }
 
-    /// A stream's name as it stands in logs and proofs.
+    /// The name of a stream in logs and proofs.
     pub fn stream_text(&self) -> String {
         StreamId::of_tenant(&self.tenant()).to_string()
     }
 
-    /// Whether words of this lab stand in `bytes`.
+    /// True if `bytes` contain words of this lab.
     pub fn is_in(&self, bytes: &[u8]) -> bool {
         super::contains(bytes, self.canary.as_bytes())
     }

@@ -1,4 +1,4 @@
-//! Every log line of the process, at the most talkative level.
+//! Every log line of the process, at the most detailed level.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};

@@ -1,6 +1,7 @@
-//! No lab reaches another: every verb, with every name that could lead across, from every role, by
-//! every trick we know, through real sockets. Each lab has words of its own that nobody else says;
-//! they must come up in no other lab's replies, exports and errors, and in no log line at all.
+//! No lab can reach another. The attempts use every verb, every name that could lead to the other
+//! lab, every role and every trick that we know, through real sockets. Each lab has words that
+//! nobody else says. They must not appear in replies, exports and errors of the other lab, nor in
+//! any log line.
 
 mod attempts;
 mod labs;
@@ -16,7 +17,7 @@ use attempts::{Attempt, attempts};
 use labs::{Lab, Service, Wire};
 use lines::Lines;
 
-/// At least so many attempts, whatever becomes of the lists they are made from.
+/// At least this many attempts, so that a list that became empty is noticed.
 const ATTEMPTS_MIN: usize = 5_000;
 
 #[test]
@@ -58,7 +59,7 @@ fn no_attempt_to_cross_brings_out_or_changes_anything_of_another_lab() {
     drop(wires);
     service.stop();
 
-    // What leaves the house by other ways.
+    // Other ways by which words could leave the service.
     for (lab, other) in [(&attacker, &victim), (&victim, &attacker)] {
         let text = exported(dir.path(), &lab.name);
         assert!(lab.is_in(&text), "the search finds a lab's own words");
@@ -76,7 +77,7 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|window| window == part)
 }
 
-/// The decrypted records of one tenant, as the command writes them, and what it says about it.
+/// The decrypted records of one tenant, as the command writes them, and what it prints.
 fn exported(dir: &std::path::Path, name: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("people.ndjson");

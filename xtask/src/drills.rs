@@ -1,8 +1,9 @@
-//! The long runs behind `docs/reliability.md`. The test command makes short ones of each.
+//! The long runs behind `docs/reliability.md`. The test command runs a short one of each.
 
 use crate::machine::{self, run_with};
 
-/// Runs `seeds` seeds of the simulator from `first` on; the first that breaks a law is printed.
+/// Runs `seeds` seeds of the simulator, beginning with `first`. Prints the first seed that breaks a
+/// law.
 pub fn simulate(seeds: u64, first: u64) -> Result<(), String> {
     run_with(
         &[("APPRENTICE_SEEDS", &seeds.to_string()), ("APPRENTICE_SEED", &first.to_string())],
@@ -11,21 +12,21 @@ pub fn simulate(seeds: u64, first: u64) -> Result<(), String> {
     )
 }
 
-/// Kills the service so many times; the first acknowledgement that is not found again is printed.
+/// Kills the service this number of times. Prints the first acknowledgement that is lost.
 pub fn crash(kills: u64, seed: Option<u64>) -> Result<(), String> {
     faults("whenever_it_is_killed", "APPRENTICE_KILLS", kills, seed)
 }
 
-/// Copies so many images of a disk in mid-write; the first that broke a promise is printed.
+/// Copies this number of images of a disk during writes. Prints the first that broke a promise.
 ///
-/// - errors: this machine cannot do it, too.
+/// - errors: also if this machine cannot do it.
 pub fn powerloss(images: u64, seed: Option<u64>) -> Result<(), String> {
     machine::disk_tools()?;
     faults("after_a_power_cut", "APPRENTICE_IMAGES", images, seed)
 }
 
-/// Throws so many cases at the decoders; the first that makes one panic, or take too much memory, is
-/// printed.
+/// Gives this number of cases to the decoders. Prints the first that causes a panic or takes too
+/// much memory.
 pub fn fuzz(cases: u64, seed: Option<u64>, target: Option<&str>) -> Result<(), String> {
     let (cases, seed) = (cases.to_string(), seed.map(|seed| seed.to_string()));
     let mut environment = vec![("APPRENTICE_CASES", &*cases)];
@@ -36,8 +37,8 @@ pub fn fuzz(cases: u64, seed: Option<u64>, target: Option<&str>) -> Result<(), S
     run_with(&environment, "cargo", &arguments)
 }
 
-/// Flips so many bits of a closed directory, one at a time; the first that was neither harmless nor
-/// reported is printed.
+/// Flips this number of bits of a closed directory, one at a time. Prints the first that was
+/// neither harmless nor reported.
 pub fn damage(flips: u64, seed: Option<u64>) -> Result<(), String> {
     let (flips, seed) = (flips.to_string(), seed.map(|seed| seed.to_string()));
     let mut environment = vec![("APPRENTICE_FLIPS", &*flips)];
@@ -48,7 +49,7 @@ pub fn damage(flips: u64, seed: Option<u64>) -> Result<(), String> {
 
 fn faults(test: &str, variable: &str, count: u64, seed: Option<u64>) -> Result<(), String> {
     let (count, seed) = (count.to_string(), seed.map(|seed| seed.to_string()));
-    // A long run that skips what it was started for has failed.
+    // A long run that skips its test has failed.
     let mut environment = vec![(variable, &*count), ("CI", "true")];
     environment.extend(seed.as_deref().map(|seed| ("APPRENTICE_SEED", seed)));
     let arguments = ["test", "--release", "--test", "faults", "--", "--nocapture", test];

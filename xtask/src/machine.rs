@@ -1,4 +1,4 @@
-//! What the tests need from the machine, installed when it is missing.
+//! Installs what the tests need and the machine lacks.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,7 +9,7 @@ pub fn root() -> PathBuf {
     here.parent().expect("xtask lies in the workspace").to_owned()
 }
 
-/// Whether a program answers to these arguments.
+/// True if a program runs with these arguments.
 pub fn answers(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);
     command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
@@ -23,7 +23,7 @@ pub fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
     run_with(&[], program, arguments)
 }
 
-/// As [`run`], with more environment variables.
+/// The same as [`run`], with more environment variables.
 pub fn run_with(
     environment: &[(&str, &str)],
     program: &str,
@@ -47,7 +47,7 @@ fn target() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
 }
 
-/// The service as released.
+/// The service in the release build.
 ///
 /// - errors: it does not build.
 pub fn release_binary() -> Result<PathBuf, String> {
@@ -63,7 +63,7 @@ pub fn unoptimised_binary() -> Result<PathBuf, String> {
     built_otherwise("unoptimised", &["opt-level=0"])
 }
 
-/// The service with our own packages built as for a release.
+/// The service with our own packages built as in a release.
 ///
 /// - errors: it does not build.
 pub fn optimised_binary() -> Result<PathBuf, String> {
@@ -73,7 +73,7 @@ pub fn optimised_binary() -> Result<PathBuf, String> {
     )
 }
 
-/// The packages that a binary is built from and that are ours.
+/// Our own packages that a binary is built from.
 const OWN: [&str; 8] = [
     "apprentice",
     "apprentice-cli",
@@ -85,9 +85,9 @@ const OWN: [&str; 8] = [
     "apprentice-study",
 ];
 
-/// The service with our own packages built by other settings. The packages it depends on are those
-/// of the development build, so that they are not all built once more: a profile of its own would
-/// not allow that.
+/// The service with our own packages built with other settings. Its dependencies are those of the
+/// development build, so that they are not all built again. A separate profile would build them
+/// all.
 fn built_otherwise(name: &str, settings: &[&str]) -> Result<PathBuf, String> {
     let mut arguments = vec!["build".to_owned()];
     for package in OWN {
@@ -100,7 +100,7 @@ fn built_otherwise(name: &str, settings: &[&str]) -> Result<PathBuf, String> {
     arguments.extend(what.map(str::to_owned));
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     run("cargo", &arguments)?;
-    // The next development build takes that place again.
+    // The next development build writes to the same place.
     let (built, kept) =
         (target().join("debug/apprentice"), target().join(format!("{name}-apprentice")));
     std::fs::copy(&built, &kept).map_err(|e| format!("cannot copy {}: {e}", built.display()))?;
@@ -131,14 +131,14 @@ pub fn python() -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Says what is being installed, so that nobody wonders.
+/// Says what is being installed.
 fn say(what: &str) {
     eprintln!("xtask: installing {what}");
 }
 
 /// Installs everything that [`crate::stage`] needs and this machine lacks.
 ///
-/// - returns: sentences about what could not be installed and is not needed everywhere.
+/// - returns: sentences about what could not be installed, if not every machine needs it.
 /// - errors: what could not be installed and is needed.
 pub fn setup() -> Result<Vec<String>, String> {
     python()?;
@@ -158,7 +158,7 @@ pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
     run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", package])
 }
 
-/// What makes and mounts a file system in a file.
+/// The programs that make and mount a file system in a file.
 pub fn disk_tools() -> Result<(), String> {
     debian("e2fsprogs", || answers("mkfs.ext4", &["-V"]))?;
     debian("mount", || answers("losetup", &["--version"]))?;
@@ -171,7 +171,7 @@ pub fn cargo_deny() -> Result<(), String> {
         return Ok(());
     }
     say("cargo-deny 0.20.2");
-    // It runs once: a build without optimisation is there sooner.
+    // It runs only once, and a build without optimisation is faster.
     let install = ["install", "cargo-deny", "--version", "0.20.2", "--locked", "--debug"];
     run("cargo", &[&install[..], &["--quiet"]].concat())
 }

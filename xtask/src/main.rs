@@ -1,4 +1,4 @@
-//! The one tool of the house. `cargo xtask test` is what CI runs.
+//! The developers' commands. `cargo xtask test` is what CI runs.
 
 mod budget;
 mod drills;
@@ -29,13 +29,13 @@ enum Task {
         #[arg(long)]
         enforce_budget: bool,
     },
-    /// What one wants to know before every commit: format, lints, unit tests, the map.
+    /// The checks before every commit: format, lints, unit tests, the tables of ARCHITECTURE.md.
     ///
     /// Takes under a minute when the build tree is warm.
     Check,
     /// Installs what the tests need and this Debian machine lacks, and says what it installs.
     Setup,
-    /// What is checked before a release, beside `test`: the release build trains the same minds, two
+    /// The checks before a release, besides `test`: the release build trains the same minds, two
     /// release builds in different folders are the same bytes, and the long runs.
     ///
     /// Takes hours.
@@ -44,57 +44,57 @@ enum Task {
         #[arg(long)]
         short: bool,
     },
-    /// The simulator: as many seeds as wanted, in the release build.
+    /// The simulator: any number of seeds, in the release build.
     ///
     /// Example: cargo xtask simulate --seeds 1000000
     Simulate {
-        /// How many seeds; one when only --seed is given.
+        /// How many seeds; one if only --seed is given.
         #[arg(long)]
         seeds: Option<u64>,
         /// The first seed.
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// The service killed: as many SIGKILLs as wanted, in the release build.
+    /// The service killed: any number of SIGKILLs, in the release build.
     ///
     /// Example: cargo xtask crash --kills 1000
     Crash {
         #[arg(long)]
         kills: u64,
-        /// As an earlier run printed it; drawn when left out.
+        /// A seed that an earlier run printed; random by default.
         #[arg(long)]
         seed: Option<u64>,
     },
-    /// The power cut: as many images of a disk as wanted, in the release build. Needs root.
+    /// The power cut: any number of images of a disk, in the release build. Needs root.
     ///
     /// Example: cargo xtask powerloss --images 500
     Powerloss {
         #[arg(long)]
         images: u64,
-        /// As an earlier run printed it; drawn when left out.
+        /// A seed that an earlier run printed; random by default.
         #[arg(long)]
         seed: Option<u64>,
     },
-    /// Hostile bytes: as many cases as wanted for every decoder, in the release build.
+    /// Hostile bytes: any number of cases for every decoder, in the release build.
     ///
     /// Example: cargo xtask fuzz --cases 100000000 --seed 7
     Fuzz {
         #[arg(long)]
         cases: u64,
-        /// As an earlier run printed it; drawn when left out.
+        /// A seed that an earlier run printed; random by default.
         #[arg(long)]
         seed: Option<u64>,
-        /// Only decoders whose name has this in it.
+        /// Only decoders whose name contains this.
         #[arg(long)]
         target: Option<String>,
     },
-    /// A closed directory damaged: as many flipped bits as wanted, in the release build.
+    /// A closed directory damaged: any number of flipped bits, in the release build.
     ///
     /// Example: cargo xtask damage --flips 20000
     Damage {
         #[arg(long)]
         flips: u64,
-        /// As an earlier run printed it; drawn when left out.
+        /// A seed that an earlier run printed; random by default.
         #[arg(long)]
         seed: Option<u64>,
     },

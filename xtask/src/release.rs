@@ -1,4 +1,4 @@
-//! What is checked before a release and too long for every run of the tests.
+//! Checks before a release that take too long for every run of the tests.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::drills;
 use crate::machine::{self, run, run_with};
 
-/// - `short`: without the long runs.
+/// - `short`: leaves out the long runs.
 /// - errors: the first check that failed.
 pub fn check(short: bool) -> Result<(), String> {
     machine::setup()?;
@@ -30,11 +30,11 @@ fn same_minds() -> Result<(), String> {
     run_with(&environment, "cargo", &test)
 }
 
-/// Two release builds of the last commit, each in a folder of its own, are the same bytes.
+/// Two release builds of the last commit, in different folders, are the same bytes.
 fn same_bytes() -> Result<(), String> {
     eprintln!("== two release builds in different folders are the same bytes");
     let scratch = machine::root().join("target/two-builds");
-    // What an interrupted run left.
+    // Left by an interrupted run.
     let _ = fs::remove_dir_all(&scratch);
     let built = ["one", "another-folder"].map(|name| build_in(&scratch.join(name)));
     let [one, other] = built;
@@ -51,7 +51,7 @@ fn same_bytes() -> Result<(), String> {
     }
 }
 
-/// Builds the last commit in `folder`, which is made.
+/// Builds the last commit in `folder`, which must not exist yet.
 ///
 /// - returns: the binary's bytes.
 fn build_in(folder: &Path) -> Result<Vec<u8>, String> {
@@ -61,7 +61,7 @@ fn build_in(folder: &Path) -> Result<Vec<u8>, String> {
     let home =
         std::env::var("CARGO_HOME").or_else(|_| std::env::var("HOME").map(|h| h + "/.cargo"));
     let home = home.map_err(|_| "neither CARGO_HOME nor HOME is set".to_owned())?;
-    // The C++ of libzmq, too.
+    // Also for the C++ of libzmq.
     let flags = format!("--remap-path-prefix={path}=/apprentice --remap-path-prefix={home}=/cargo");
     let prefixes = format!("-ffile-prefix-map={path}=/apprentice -ffile-prefix-map={home}=/cargo");
     let target = folder.join("target").display().to_string();

@@ -21,7 +21,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "licences", act: licences },
 ];
 
-/// What `cargo xtask check` runs: what one wants to know before every commit.
+/// What `cargo xtask check` runs: the checks before every commit.
 const CHECKS: &[Stage] = &[
     Stage { name: "format", act: || run("cargo", &["fmt", "--all", "--check"]) },
     Stage { name: "lint", act: lint },
@@ -39,12 +39,13 @@ pub fn check() -> Result<(), String> {
     Ok(())
 }
 
-/// Runs the stages, or those named, and prints what each took.
+/// Runs all stages, or the named ones, and prints how long each took.
 ///
-/// - `enforce_budget`: a stage over its budget fails. Without it the run warns and goes on, because
-///   budgets are those of one machine and a slower one is no fault of the code.
-/// - errors: the first stage that failed, or exceeded its budget where that counts; a stage without
-///   a budget.
+/// - `enforce_budget`: a stage that exceeds its budget fails. Otherwise the run warns and
+///   continues, because the budgets are those of one machine, and a slower machine is no fault of
+///   the code.
+/// - errors: the first stage that failed or, if enforced, exceeded its budget; a stage without a
+///   budget.
 pub fn run_all(only: &[String], enforce_budget: bool) -> Result<(), String> {
     let known: Vec<&str> = STAGES.iter().map(|stage| stage.name).collect();
     if let Some(unknown) = only.iter().find(|name| !known.contains(&name.as_str())) {
@@ -67,7 +68,7 @@ pub fn run_all(only: &[String], enforce_budget: bool) -> Result<(), String> {
         }
     }
     println!("{}", took.join("\n"));
-    // Again at the end, where it is seen.
+    // Printed again at the end, where it is easy to see.
     over.iter().for_each(|sentence| println!("warning: {sentence}"));
     Ok(())
 }
@@ -76,13 +77,13 @@ fn lint() -> Result<(), String> {
     run("cargo", &["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])
 }
 
-/// Tells what could not be installed: its tests then say so, or fail where CI=true.
+/// Prints what could not be installed. The tests that need it then say so, or fail with CI=true.
 fn setup() -> Result<(), String> {
     machine::setup()?.iter().for_each(|missing| eprintln!("xtask: {missing}"));
     Ok(())
 }
 
-/// The libraries' own tests, and that the map is the territory.
+/// The unit tests of the libraries, and the checks of `ARCHITECTURE.md`.
 fn unit() -> Result<(), String> {
     run("cargo", &["test", "--quiet", "--workspace", "--lib", "--test", "tidy"])
 }
@@ -93,7 +94,7 @@ fn build() -> Result<(), String> {
     run("cargo", &["test", "--workspace", "--no-run", "--quiet"])
 }
 
-/// Hands the tests the binaries that show the same bits in any build and on any processor.
+/// Gives the tests the binaries for comparing bits between builds and processors.
 fn test() -> Result<(), String> {
     let binaries = [
         ("APPRENTICE_OPTIMISED_BINARY", machine::optimised_binary()?),
@@ -101,12 +102,12 @@ fn test() -> Result<(), String> {
     ];
     let shown = binaries.map(|(name, path)| (name, path.display().to_string()));
     let environment = shown.each_ref().map(|(name, path)| (*name, path.as_str()));
-    // Everything that is wrong is said in one run, not the first of it.
+    // One run reports all errors, not only the first.
     run_with(&environment, "cargo", &["test", "--workspace", "--no-fail-fast"])
 }
 
 fn docs() -> Result<(), String> {
-    // A link that leads nowhere is an error.
+    // A broken link is an error.
     run_with(
         &[("RUSTDOCFLAGS", "-D warnings")],
         "cargo",
@@ -114,7 +115,8 @@ fn docs() -> Result<(), String> {
     )
 }
 
-/// Advisories need a database that not every machine can reach: by hand, see `deny.toml`.
+/// Advisories need a database that not every machine can reach. Check them by hand, see
+/// `deny.toml`.
 fn licences() -> Result<(), String> {
     run("cargo", &["deny", "check", "licenses", "bans", "sources"])
 }

@@ -1,8 +1,8 @@
-//! What a run draws by chance, and how it is repeated.
+//! Random draws of a test run, and how to repeat the run.
 
 use apprentice::store::{Entropy, OsEntropy, SeededEntropy};
 
-/// A number that the environment chooses, or what stands for it.
+/// A number from the environment, or the default.
 pub fn number(variable: &str, otherwise: u64) -> u64 {
     let text = std::env::var(variable).ok();
     text.map_or(otherwise, |text| {
@@ -10,8 +10,8 @@ pub fn number(variable: &str, otherwise: u64) -> u64 {
     })
 }
 
-/// A seed that is printed, so that a failure can be tried again; threads and the disk have their
-/// own say in what happens under it.
+/// A seed that is printed, so that a failure can be repeated. Threads and the disk may still behave
+/// differently.
 pub fn seed() -> u64 {
     let mut bytes = [0; 8];
     OsEntropy.fill(&mut bytes);

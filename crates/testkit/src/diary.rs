@@ -1,4 +1,4 @@
-//! One person's life, written by hand into any store: what the actor does, without actors.
+//! One person's history, written into any store by hand: what the actor does, without actors.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ pub struct Diary<D: Domain> {
     pub session: Session<D>,
     pub store: Store,
     pub stream: StreamId,
-    /// Every mind there was, the base mind first.
+    /// All minds, the base mind first.
     pub minds: Vec<Arc<Mind>>,
     requests: u64,
 }
@@ -25,7 +25,7 @@ impl<D: Domain> Diary<D> {
         Diary::new_in(domain, store, &TenantId::local(), user, recipe_text)
     }
 
-    /// Opens the session of a new person of a lab that exists.
+    /// Opens the session of a new person in an existing lab.
     pub fn new_in(
         domain: &Arc<D>,
         store: &Store,
@@ -50,7 +50,7 @@ impl<D: Domain> Diary<D> {
         self.decided_by(Session::propose, command)
     }
 
-    /// As older versions took it, which let more characters in.
+    /// As older versions did it, which accepted more characters.
     pub fn give_as_of_old(&mut self, command: &Command) -> Result<Reply, Rejection> {
         self.decided_by(Session::propose_recorded, command)
     }
@@ -90,7 +90,7 @@ impl<D: Domain> Diary<D> {
         self.accept(&Command::Done);
     }
 
-    /// Teaches the first utterance that is still to be taught; gives the lesson's record.
+    /// Teaches the first utterance that can still be taught. Returns the lesson's record.
     pub fn teach(&mut self, actions: &[u32]) -> Seq {
         let explains = self.session.status().to_teach[0].seq;
         let (actions, on_clash) = (actions.to_vec(), OnClash::Ask);
@@ -102,7 +102,7 @@ impl<D: Domain> Diary<D> {
         lesson.expect("a lesson was taught")
     }
 
-    /// Ends teaching where that is due, and trains.
+    /// Ends teaching if that is due, and trains.
     pub fn learn(&mut self) -> Arc<Mind> {
         if self.session.phase() == Phase::Teaching {
             self.accept(&Command::FinishTeaching);
@@ -123,8 +123,8 @@ impl<D: Domain> Diary<D> {
         records.map(Result::unwrap).collect()
     }
 
-    /// Another store with these records, but that `change` may alter each event first: the seals
-    /// and the chain of the copy are as good as those of the original.
+    /// Another store with these records. `change` may alter each event first. The seals and the
+    /// chain of the copy are valid, like those of the original.
     pub fn doctored(&self, store: Store, mut change: impl FnMut(Seq, &mut Event)) -> Store {
         let user = self.session.state().opened.as_ref().unwrap().user.clone();
         let stream = store.keys.stream_id(&self.stream.tenant, &user).unwrap();

@@ -1,4 +1,4 @@
-//! What a seed decides.
+//! Random draws that a seed decides.
 
 use apprentice::numerics::Rng;
 
@@ -27,7 +27,7 @@ impl Dice {
         self.0.next_u64()
     }
 
-    /// The number of one of `weights`, each as likely as it is heavy.
+    /// Draws one of the choices, with its weight as its probability.
     pub fn weighted<T: Copy>(&mut self, choices: &[(usize, T)]) -> T {
         let mut roll = self.below(choices.iter().map(|(weight, _)| weight).sum());
         for &(weight, choice) in choices {

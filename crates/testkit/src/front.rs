@@ -1,10 +1,10 @@
-//! Handing in what a gateway would.
+//! Submits requests as a gateway does.
 
 use apprentice::actors::{AnswerTo, Front, Submit};
 use apprentice::client::{Ask, DoorAsk};
 use apprentice::ids::{RequestId, TenantId, UserId};
 
-/// Counts a request against its tenant's quotas and hands it in.
+/// Counts a request for its tenant's quotas and submits it.
 pub fn hand_in(
     front: &Front,
     (tenant, user): (TenantId, UserId),

@@ -1,10 +1,10 @@
-//! The Python that examples and the second reader of proofs run in.
+//! The Python that runs the examples and the second verifier of proofs.
 
 use std::path::PathBuf;
 use std::process::Command;
 
-/// An interpreter that has the packages; none, with a message, where there is no such one and no CI
-/// asks for it.
+/// An interpreter with the packages. If there is none, the result is none, with a message; with
+/// `CI=true` it panics.
 ///
 /// - `packages`: as Python imports them, `zmq, msgpack`.
 pub fn python(packages: &str) -> Option<PathBuf> {

@@ -1,4 +1,4 @@
-//! The program as people start it.
+//! The program as a user starts it.
 
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -12,7 +12,7 @@ pub struct Ran {
 
 /// Runs the program to its end.
 ///
-/// - `input`: what is typed.
+/// - `input`: the typed text.
 #[track_caller]
 pub fn run(arguments: &[&str], input: &str) -> Ran {
     let mut command = Command::new(crate::paths::program());

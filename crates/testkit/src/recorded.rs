@@ -1,4 +1,4 @@
-//! An event as a log gives it back, without a log.
+//! An event as a log returns it, without a log.
 
 use apprentice::events::{Event, Head, Record, decode, encode};
 use apprentice::ids::{Digest, RequestId, Timestamp};

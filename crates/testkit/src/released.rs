@@ -1,16 +1,16 @@
-//! Data directories that releases wrote.
+//! Data directories that earlier releases wrote.
 
 use std::fs;
 use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// A file that stands beside what `release` wrote.
+/// A file next to the directory that `release` wrote.
 pub fn golden(release: &str, name: &str) -> PathBuf {
     crate::paths::root().join("tests/golden").join(release).join(name)
 }
 
-/// A directory that `release` wrote, unpacked: `data` or another archive's name.
+/// A directory that `release` wrote, unpacked. The archive is `data` or has another name.
 pub fn released(release: &str, archive: &str) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let packed = fs::File::open(golden(release, &format!("{archive}.tar.gz"))).unwrap();

@@ -1,4 +1,4 @@
-//! One sample event or more of every kind, and what each field means.
+//! At least one sample event of every kind, and the meaning of each field.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use apprentice::language::{
 };
 use serde_json::json;
 
-/// Name of the golden files, and the event. The name of a kind's first sample is the kind's.
+/// Name of the golden files, and the event. The first sample of a kind has the name of the kind.
 pub fn samples() -> Vec<(&'static str, Event)> {
     vec![
         ("session_opened", Event::SessionOpened(session_opened())),
@@ -48,7 +48,7 @@ pub fn samples() -> Vec<(&'static str, Event)> {
     ]
 }
 
-/// Fields whose inside belongs to the domain.
+/// Fields whose content belongs to the domain.
 pub const DOCUMENTS: [&str; 2] = ["episode_started.scene", "episode_started.task"];
 
 /// What each field means. A field without a line here fails the test.
@@ -65,7 +65,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("episode_started.task", "the task, a document of the domain"),
     ("episode_started.goal", "the task as a sentence"),
     ("episode_started.seed", "seed of a drawn stage; null when a scene file was given"),
-    ("episode_started.fewest", "fewest primitives that achieve the task, where known"),
+    ("episode_started.fewest", "the fewest primitives that achieve the task, if known"),
     ("interpreted.utterance", "what was typed"),
     ("interpreted.answer.outcome", "understood, impossible or not_sure"),
     ("interpreted.answer.outcome.understood.program", "what was carried out"),
@@ -79,7 +79,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ),
     (
         "interpreted.answer.evidence.accounting[].word",
-        "a word or phrase; absent: not accounted for",
+        "a word or phrase; absent if the recipe does not account for words",
     ),
     (
         "interpreted.answer.evidence.accounting[].as",
@@ -100,7 +100,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("interpreted.answer.evidence.reranked", "candidates the reranker chose from; 0: not asked"),
     (
         "interpreted.answer.evidence.answered_by[]",
-        "which part of the parser gave each clause: grammar or seq2seq; absent where it has no parts",
+        "which part of the parser answered each clause: grammar or seq2seq; absent if it has no parts",
     ),
     ("interpreted.answer.mentioned", "the type of the last mention, for a later \"it\""),
     ("interpreted.actions_before", "primitives carried out in the episode before"),
@@ -125,7 +125,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("retrain_completed.mind", "digest of the new mind"),
     ("retrain_completed.report.exemplars", "seeds and live lessons"),
     ("retrain_completed.report.threshold", "the calibrated threshold"),
-    ("retrain_completed.report.figures", "what else the parser kind reports, by name"),
+    ("retrain_completed.report.figures", "other figures of this kind of parser, by name"),
     ("retrain_completed.code", "digest of the code that trained; null when version 1 did not say"),
     ("retrain_failed.recipe", "digest of the recipe"),
     ("retrain_failed.reason", "why; the previous mind stays"),
@@ -136,24 +136,27 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("key_retired.key", "a key that was admitted before"),
     (
         "key_retired.overlap_seconds",
-        "seconds that it stays good after that reading; at most 30 days",
+        "seconds that the key still works after that reading; at most 30 days",
     ),
     (
         "key_retired.wall",
-        "what the wall clock read, which a held record time is not; µs since the epoch",
+        "the reading of the wall clock, in µs since 1970; a held record time is no reading",
     ),
-    ("tenant_disabled.reason", "why nobody comes in any more"),
-    ("quotas_set.quotas.awake_users", "people awake at once; null: no limit but the machine's"),
-    ("quotas_set.quotas.in_flight", "requests taken and not yet answered"),
+    ("tenant_disabled.reason", "why the tenant is shut out"),
+    (
+        "quotas_set.quotas.awake_users",
+        "people awake at the same time; null: only the machine's limit",
+    ),
+    ("quotas_set.quotas.in_flight", "requests accepted and not yet answered"),
     ("quotas_set.quotas.utterances_per_second", "utterances a second, in the long run"),
     ("quotas_set.quotas.burst", "utterances at once after a silence"),
-    ("quotas_set.quotas.sealed_bytes", "sealed bytes in the log, all in all"),
+    ("quotas_set.quotas.sealed_bytes", "the total of sealed bytes in the log"),
     ("quotas_set.quotas.trainings_waiting", "trainings waiting"),
     ("person_erased.stream", "the stream of the person whose key was destroyed"),
     ("person_erased.last", "the last record of that stream"),
     ("person_erased.head", "its digest"),
     ("person_erased.signature", "Ed25519 by the tenant's key over the statement of the erasure"),
-    ("segment_closed.stream", "the stream of which a stretch is sealed"),
+    ("segment_closed.stream", "the stream that the segment belongs to"),
     ("segment_closed.first", "its first record"),
     ("segment_closed.last", "its last record, included"),
     ("segment_closed.root", "RFC 6962 tree over the digests of these records"),
@@ -253,7 +256,7 @@ fn by_the_baseline() -> Interpreted {
     event
 }
 
-/// "Robot, put the second mug on the table": words chose the mug, the world the table.
+/// "Robot, put the second mug on the table": the words chose the mug, the world chose the table.
 fn chosen() -> Interpreted {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let chosen =

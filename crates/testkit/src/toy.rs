@@ -1,5 +1,5 @@
-//! A world of three bells, for tests that are about the service and not about the household: it
-//! trains in no time, and proves that nothing outside `world/` knows about mugs.
+//! A world of three bells, for tests of the service, not of the household. It trains very fast. It
+//! also shows that nothing outside `world/` knows about mugs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -15,9 +15,9 @@ use apprentice::world::{
     Domain, Edition, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
 };
 
-/// Bells ring until they are muted. Break one and the world panics, which is for tests of what the
-/// service makes of it; so are `brittle`, a world in which training a reranker panics, `slow`, one
-/// in which it waits for a gate, and `fickle`, one that cannot say the same thing twice.
+/// Bells ring until they are muted. Breaking a bell makes the world panic, for tests of how the
+/// service handles it. There are more such worlds: in `brittle`, training a reranker panics; in
+/// `slow`, it waits for a gate; `fickle` does not say the same thing twice.
 pub struct Bells {
     brittle: bool,
     gate: Option<Arc<Gate>>,
@@ -46,7 +46,7 @@ impl Gate {
     }
 }
 
-/// Whether scenes have another digest each time that somebody asks.
+/// True if scenes have another digest at each call.
 #[derive(Default)]
 pub struct Fickle {
     pub is_on: AtomicBool,
@@ -84,12 +84,13 @@ impl Bells {
         Bells { gate: Some(gate), ..Bells::new() }
     }
 
-    /// A world in which, while `fickle` is on, the decider and the fold can agree on no utterance.
+    /// A world in which, while `fickle` is on, the decider and the fold disagree on every
+    /// utterance.
     pub fn fickle(fickle: Arc<Fickle>) -> Bells {
         Bells { fickle: Some(fickle), ..Bells::new() }
     }
 
-    /// A world without a word for breaking, so that no training can come to it.
+    /// A world without a word for breaking, so that training never breaks a bell.
     pub fn sturdy() -> Bells {
         let mut bells = Bells::new();
         bells.signature.operators.retain(|operator| operator.name.as_str() != "BREAK");
@@ -152,7 +153,7 @@ impl Domain for Bells {
         &self.seeds
     }
 
-    /// A task is the bells that are to ring, like `Brass Glass`; at first all are silent.
+    /// A task is the bells that must ring, like `Brass Glass`. At first all are silent.
     fn stage(&self, request: &Stage) -> Result<(Ringing, Ringing), StageError> {
         let task = match request {
             Stage::Seed { seed } => BELLS[*seed as usize % 3].to_owned(),

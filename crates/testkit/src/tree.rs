@@ -1,4 +1,4 @@
-//! Folders, copied.
+//! Copies folders.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! A MessagePack value of any shape, as strangers see it, with a notation: JSON, in which bytes are
-//! written as a text of `0x` and hexadecimal digits. Maps keep their order.
+//! A MessagePack value of any shape, as other programs see it, with a notation. The notation is
+//! JSON, in which bytes are text: `0x` and hexadecimal digits. Maps keep their order.
 
 use std::fmt::{self, Write};
 
@@ -13,7 +13,7 @@ pub enum Value {
     Bool(bool),
     Int(i64),
     Unsigned(u64),
-    /// Single precision: MessagePack tells the two apart, JSON does not.
+    /// Single precision: MessagePack distinguishes single and double, JSON does not.
     Single(f32),
     Double(f64),
     Text(String),
@@ -35,7 +35,7 @@ impl Value {
         serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in\n{text}"))
     }
 
-    /// The notation, broken into lines where it is long.
+    /// The notation, with line breaks if it is long.
     pub fn notation(&self) -> String {
         let mut out = String::new();
         self.write(&mut out, 0);

@@ -1,23 +1,23 @@
-//! Layout 1, written by 0.1. It differs from layout 2 in the database `cache/` alone, whose blobs
-//! say nothing of the code that made them:
+//! Layout 1, written by 0.1. It differs from layout 2 only in the database `cache/`. Its blobs do
+//! not name the code that made them:
 //!
 //! - tree `models/<tenant>`: key = stream key (16) ‖ digest of the mind (32) ‖ number of the piece
 //!   (4). The pieces in order are nonce ‖ sealed bytes of the mind, under the person's data key,
 //!   with [`SealedMind::bound`] as associated data;
-//! - tree `snapshots/<tenant>`: states, which fit no later version.
+//! - tree `snapshots/<tenant>`: states, which no later version can read.
 
 use std::collections::BTreeMap;
 
-/// What the names of trees with minds begin with; the tenant follows.
+/// The beginning of the names of trees with minds. The tenant follows.
 pub const MINDS: &str = "models/";
-/// What the names of trees with snapshots begin with.
+/// The beginning of the names of trees with snapshots.
 pub const SNAPSHOTS: &str = "snapshots/";
 
-/// Bytes of a mind's key without the number of the piece.
+/// Bytes of a mind's key, without the number of the piece.
 const MIND_KEY: usize = 16 + 32;
 const PIECE: usize = 4;
 
-/// A mind as layout 1 kept it.
+/// A mind in layout 1.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SealedMind {
     pub stream: [u8; 16],
@@ -26,13 +26,13 @@ pub struct SealedMind {
 }
 
 impl SealedMind {
-    /// What the seal binds the mind to.
+    /// The associated data of the seal.
     pub fn bound(&self) -> Vec<u8> {
         [&b"apprentice 1: mind\0"[..], &self.stream, &self.digest].concat()
     }
 }
 
-/// Puts the pieces of a person's minds together; keys that are no keys of minds are left out.
+/// Joins the pieces of a person's minds. Other keys are left out.
 pub fn minds(entries: impl IntoIterator<Item = (Vec<u8>, Vec<u8>)>) -> Vec<SealedMind> {
     let pieces = entries.into_iter().filter(|(key, _)| key.len() == MIND_KEY + PIECE);
     let pieces: BTreeMap<Vec<u8>, Vec<u8>> = pieces.collect();

@@ -4,8 +4,8 @@ use serde::Deserialize;
 
 use super::Digest;
 
-/// Version 1, written by 0.1 and 0.2: it does not say which things words chose, why an utterance
-/// was no request, and what each word was used for.
+/// Version 1, written by 0.1 and 0.2. It does not say which things the words chose, why an
+/// utterance was no request, and what each word was used for.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct V1 {
     pub utterance: String,
@@ -39,7 +39,7 @@ pub struct Evidence {
     pub threshold: f32,
     pub discarded: Vec<Discarded>,
     pub reranked: u32,
-    /// Absent in what 0.1 wrote, and where it would be empty.
+    /// Absent in records of 0.1, and if it is empty.
     #[serde(default)]
     pub answered_by: Vec<Answerer>,
 }

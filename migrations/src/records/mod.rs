@@ -7,5 +7,5 @@ pub mod retrain_completed;
 
 pub use bytes::Digest;
 
-/// What is frozen here: number of the kind, version of the body.
+/// The frozen formats: number of the kind, version of the body.
 pub const FROZEN: &[(u16, u16)] = &[(3, 1), (9, 1), (14, 1)];

@@ -1,9 +1,10 @@
-//! Whatever stage is set and whatever is asked in whichever phase: what is proposed can be applied,
-//! and the records fold again to the same state. Over the household as people meet it, with scenes
-//! and tasks of every kind, drawn by chance.
+//! Any command in any phase, on any stage: what is proposed can be applied, and the records fold
+//! again to the same state. The tests use the household, with random scenes and tasks of every
+//! kind.
 //!
-//! - `APPRENTICE_SEED`: of the first person, drawn and printed otherwise; the next person's is one more.
-//! - `APPRENTICE_PEOPLE`: 10,000 otherwise.
+//! - `APPRENTICE_SEED`: seed of the first person, random and printed by default. The next person
+//!   has one more.
+//! - `APPRENTICE_PEOPLE`: 10,000 by default.
 
 mod person;
 mod scenes;
@@ -53,7 +54,7 @@ fn whatever_is_asked_on_any_stage_its_records_fold_again() {
         done.fold(Counts::default(), Counts::plus)
     });
     println!("{counts:#?}");
-    // Fewer people may never meet the rare things.
+    // With fewer people the rare cases may not happen.
     if people >= 1_000 {
         counts.assert_that_all_was_met();
     }
@@ -72,7 +73,7 @@ fn a_stage_whose_goal_holds_is_refused_in_one_sentence() {
             change the scene or name another task",
             ),
         ),
-        // Nothing in particular is never done.
+        // Everything must happen at least once.
         ("free", None),
     ] {
         let stage = Stage::Scene { scene: scene.to_owned(), task: task.to_owned() };

@@ -1,4 +1,4 @@
-//! One person who does what they like.
+//! One person who does anything.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use super::scenes::{pick, said, stage};
 use apprentice_testkit::chance::below;
 use apprentice_testkit::recorded::recorded;
 
-/// Where everybody begins.
+/// The state at which every person begins.
 pub struct House {
     pub domain: Arc<Household>,
     pub recipe_text: String,
@@ -25,7 +25,7 @@ pub struct House {
 
 macro_rules! counts {
     ($($name:ident),*) => {
-        /// What was met, so that nobody believes a test which met nothing.
+        /// What happened, so that a test in which it never happened fails.
         #[derive(Debug, Default)]
         pub struct Counts {
             pub people: u64,
@@ -81,7 +81,7 @@ pub struct Person<'a> {
     trained: Option<Arc<Mind>>,
 }
 
-/// A whole life.
+/// A whole history.
 pub fn live(house: &House, seed: u64, counts: &mut Counts) {
     let mut person = Person::new(house, seed, counts);
     for _ in 0..12 + below(&person.dice, 24) {
@@ -117,7 +117,7 @@ impl<'a> Person<'a> {
         below(&self.dice, 100) < percent
     }
 
-    /// Proposes and makes true, as an actor and a log would.
+    /// Proposes and applies, as an actor and a log do.
     pub fn give(&mut self, command: &Command, counts: &mut Counts) -> Result<Reply, Rejection> {
         self.requests += 1;
         let request = RequestId(self.requests.to_be_bytes());
@@ -140,7 +140,8 @@ impl<'a> Person<'a> {
             let applied = self.session.apply(&record);
             applied.unwrap_or_else(|error| panic!("{command:?}: {error}"));
             if let Event::EpisodeEnded(ended) = &record.event {
-                // The fold lets an old record leave one out; nobody writes such a record today.
+                // The fold accepts an old record that leaves one out. No code writes such a record
+                // today.
                 let said = &self.session.state().episode.as_ref().expect("it ended").unexplained;
                 assert!(said.iter().map(|said| said.seq).eq(ended.to_teach.iter().copied()));
             }
@@ -189,14 +190,14 @@ impl<'a> Person<'a> {
         }
     }
 
-    /// The next thing to do on the shortest way to the goal, in words.
+    /// The next step of the shortest way to the goal, in words.
     fn next_step(&self) -> Option<String> {
         let episode = self.session.state().episode.as_ref()?;
         let plan = self.house.domain.plan(&episode.scene, &episode.task)?;
         plan.steps.first().map(in_words)
     }
 
-    /// What would be sensible now, or anything at all.
+    /// A sensible command, or any command.
     fn wish(&mut self) -> Command {
         if self.chance(12) {
             return self.anything();
@@ -295,7 +296,7 @@ impl<'a> Person<'a> {
         Seq::new(1 + below(&self.dice, self.records.len() + 3) as u64).unwrap()
     }
 
-    /// Ends a training: with the mind that comes of it now and then, which takes longest.
+    /// Ends a training. Only sometimes it trains the real mind, which takes longest.
     fn finish(&mut self) -> Command {
         let Some(Outstanding::Retrain { recipe, lessons }) = self.session.outstanding() else {
             return Command::Done;
@@ -343,7 +344,7 @@ impl<'a> Person<'a> {
     }
 }
 
-/// A step as somebody would say it.
+/// A step in the words of a person.
 fn in_words(step: &Step) -> String {
     let things: Vec<String> = step.args.iter().map(|kind| said(kind.as_str())).collect();
     match (step.operator.as_str(), &things[..]) {

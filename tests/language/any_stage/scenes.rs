@@ -1,4 +1,4 @@
-//! Stages by chance, good ones and bad ones.
+//! Random stages, good ones and bad ones.
 
 use apprentice::store::SeededEntropy;
 use apprentice::world::Stage;
@@ -6,7 +6,7 @@ use apprentice::world::household::{Kind, Room, Task};
 
 use apprentice_testkit::chance::below;
 
-/// A kind as people say it: `CounterTop` is a counter top.
+/// A type in the words of people: `CounterTop` is a counter top.
 pub fn said(kind: &str) -> String {
     let mut out = String::new();
     for c in kind.chars() {
@@ -26,7 +26,7 @@ fn chance(dice: &SeededEntropy, percent: usize) -> bool {
     below(dice, 100) < percent
 }
 
-/// A stage, mostly a scene as somebody may write it; and the kinds that stand in it.
+/// A stage, mostly a scene as a person may write it, and the types in it.
 pub fn stage(dice: &SeededEntropy) -> (Stage, Vec<Kind>) {
     let room = Room::ALL[below(dice, 4)];
     let mut kinds: Vec<Kind> = room.kinds().collect();
@@ -57,7 +57,7 @@ pub fn stage(dice: &SeededEntropy) -> (Stage, Vec<Kind>) {
             false => pick(dice, &places),
         };
         things.push((thing, place));
-        // Several of a kind are what `two` is about.
+        // The task `two` needs several things of a type.
         if chance(dice, 25) {
             things.push((thing, place));
         }
@@ -66,7 +66,7 @@ pub fn stage(dice: &SeededEntropy) -> (Stage, Vec<Kind>) {
         text += &format!("holds = \"{kind}\"\n");
     }
     for kind in &standing {
-        // A faucet stands at a basin, a lamp on a desk; the first such place will do.
+        // A faucet is at a basin, a lamp on a desk. The first such place is good enough.
         let on = standing.iter().find(|other| *other != kind && kind.may_stand_on(**other));
         text += &thing(dice, *kind, on.copied());
     }
@@ -101,7 +101,7 @@ fn thing(dice: &SeededEntropy, kind: Kind, place: Option<Kind>) -> String {
     }
 }
 
-/// A task about these kinds, where one can be found; one that holds already now and then.
+/// A task about these types, if there is one. Sometimes its goal is already true.
 fn task(dice: &SeededEntropy, kinds: &[Kind], things: &[(Kind, Option<Kind>)]) -> String {
     let mut text = "free".to_owned();
     for _ in 0..12 {

@@ -6,7 +6,8 @@ use super::talk::{Report, Setting, Talk, acted, line, shown};
 
 const VERBS: [&str; 6] = ["take", "bring", "carry", "move", "return", "deliver"];
 
-/// A thing as it is said, its name, and places where it is not yet: as said, and their names.
+/// A thing: how it is said, its name, and places where it is not yet (how they are said, and their
+/// names).
 type Load = (&'static str, &'static str, [(&'static str, &'static str); 3]);
 
 const LOADS: [Load; 6] = [
@@ -43,7 +44,7 @@ fn stands_at(talk: &Talk, place: &str) -> bool {
     thing(talk, place).states.iter().any(|state| state == "here")
 }
 
-/// The thing has come along: it lies at the place, or the verb leaves it in the hand there.
+/// The thing was carried: it is at the place, or in the hand there if the verb keeps it.
 fn came_along(talk: &Talk, verb: &str, kind: &str, place: &str) -> bool {
     let in_hand = matches!(verb, "take" | "carry") && held(talk, kind) && stands_at(talk, place);
     lies_at(talk, kind, place) || in_hand
@@ -112,7 +113,7 @@ fn what_is_in_the_hand_is_brought() {
     report.finish();
 }
 
-/// Another thing in the hand is in the way; it is not what is carried.
+/// If the robot holds another thing, that thing is in the way. It is not what is carried.
 #[test]
 fn another_thing_in_the_hand_is_not_carried_instead() {
     let talk = Talk::new(&Setting::kitchen().holding("Knife"));
@@ -131,7 +132,8 @@ fn another_thing_in_the_hand_is_not_carried_instead() {
     report.finish();
 }
 
-/// Fetching has no place, or the person: it ends with the thing in the hand, or nothing is done.
+/// For fetching there is no goal, or the person is the goal. The thing is in the hand at the end,
+/// or nothing is done.
 #[test]
 fn fetching_ends_with_the_thing_in_the_hand() {
     let talk = Talk::new(&Setting::kitchen());
@@ -164,7 +166,7 @@ fn fetching_ends_with_the_thing_in_the_hand() {
     report.finish();
 }
 
-/// What is said later in the sentence counts too.
+/// Later words of the sentence count too.
 #[test]
 fn what_follows_the_carrying_is_not_dropped() {
     let talk = Talk::new(&Setting::kitchen());
@@ -189,7 +191,8 @@ fn what_follows_the_carrying_is_not_dropped() {
     report.finish();
 }
 
-/// A purpose, a state or a second thing that no primitive brings about: not a walk, and not a part.
+/// With a purpose, a state or a second thing that no primitive can reach, the robot does not walk
+/// and does no part.
 #[test]
 fn carrying_for_more_than_the_walk_is_not_done_in_part() {
     let talk = Talk::new(&Setting::kitchen());
@@ -220,7 +223,7 @@ fn carrying_for_more_than_the_walk_is_not_done_in_part() {
     );
 }
 
-/// One lesson makes up for what is declined.
+/// One lesson is enough for what is declined.
 #[test]
 fn carrying_that_is_declined_can_be_taught() {
     let lesson =

@@ -1,5 +1,5 @@
-//! Lessons are replayed by effect: what is done already is skipped, what is left is done, and where
-//! nothing is left that is said.
+//! Lessons are replayed by effect: a step whose effect is there is skipped, the others are done. If
+//! nothing is left to do, the robot says so.
 
 use super::talk::{Report, Setting, Talk, Taught, WASH_MUG, acted, line, reason, shown};
 
@@ -22,7 +22,7 @@ const STOW: Taught<'_> = (
 
 const ALL: &[Taught<'_>] = &[WASH_MUG, CHILL, HEAT, STOW];
 
-/// A talk in this setting, after lessons in the kitchen as it is at first.
+/// A talk in this setting, after lessons in the kitchen in its first state.
 fn talk(setting: &Setting) -> Talk {
     Talk::taught_in(&Setting::kitchen(), ALL, setting)
 }
@@ -46,7 +46,7 @@ fn holds(talk: &Talk, (name, wanted): &Want<'_>) -> bool {
     }
 }
 
-/// Carried out, and then all this is true.
+/// Carried out, and afterwards all of this is true.
 fn ends(talk: &Talk, report: &mut Report, text: &str, wants: &[Want<'_>]) {
     let mut after = talk.clone();
     let answer = after.says(text);
@@ -167,7 +167,7 @@ fn what_is_done_already_is_skipped() {
     report.finish();
 }
 
-/// Where more than one program would be right, what counts is how it ends.
+/// If more than one program would be right, only the end counts.
 #[test]
 fn a_half_done_lesson_ends_as_a_whole_one() {
     let kitchen = Setting::kitchen;
@@ -241,7 +241,7 @@ fn a_lesson_works_a_second_time_in_one_episode() {
     report.finish();
 }
 
-/// Nothing is left to do. An empty program would be a success without an act.
+/// Nothing is left to do. An empty program would be a success without an action.
 #[test]
 fn nothing_left_to_do_is_said() {
     let lessons: &[Taught<'_>] = &[
@@ -249,7 +249,7 @@ fn nothing_left_to_do_is_said() {
         ("prepare the drawer", "GOTO Drawer; OPEN Drawer"),
         ("seize the mug", "GOTO Mug; PICKUP Mug"),
     ];
-    // The fridge stands open when it is taught.
+    // The fridge is open during the lesson.
     let taught = Setting::kitchen().with("Fridge", "open");
     let shut = || Setting::kitchen();
     let cases: &[(Setting, &[&str])] = &[
@@ -284,7 +284,7 @@ fn nothing_left_to_do_is_said() {
     report.finish();
 }
 
-/// The thing of such a lesson is where the lesson brought it: it is not fetched to be put back.
+/// If the thing is already where the lesson puts it, it is not fetched and put back.
 #[test]
 fn a_lesson_without_a_name_leaves_its_own_thing_alone() {
     type Case<'t> = (Taught<'t>, fn() -> Setting);
@@ -319,7 +319,7 @@ fn a_lesson_without_a_name_leaves_its_own_thing_alone() {
     report.finish();
 }
 
-/// What is said word for word as it was taught is mended as much as what is said a little otherwise.
+/// The exact words of a lesson are adapted in the same way as words near to them.
 #[test]
 fn near_and_exact_words_are_mended_alike() {
     let kitchen = Setting::kitchen;

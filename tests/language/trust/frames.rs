@@ -1,8 +1,8 @@
-//! Polite words, names and small words around a request change nothing of what it means.
+//! Polite words, names and small words around a request do not change what it means.
 
 use super::talk::{Report, Setting, Talk, Taught, WASH_MUG, acted, done, line, shown};
 
-/// `{bare}` is the request, `{going}` the same after "mind".
+/// `{bare}` is the request, `{going}` is its form after "mind".
 const FRAMES: &[&str] = &[
     "can you {bare}",
     "can you {bare}?",
@@ -169,7 +169,7 @@ fn a_frame_around_a_lesson_changes_nothing() {
     each_frame_changes_nothing(&talk, "frames around primitives, beside a lesson", PRIMITIVES);
 }
 
-/// A PUT has two things to lose in a frame.
+/// A PUT has two things that a frame could hide.
 #[test]
 fn a_frame_around_what_is_held_changes_nothing() {
     let talk = Talk::new(&Setting::kitchen().holding("Bread"));
@@ -179,12 +179,12 @@ fn a_frame_around_what_is_held_changes_nothing() {
         ("place the bread on the plate", "placing the bread on the plate"),
     ];
     each_frame_changes_nothing(&talk, "frames around a put", &requests[..2]);
-    // Bread does not go on a plate: a frame must not make another request of it.
+    // Bread cannot go on a plate: a frame must not make another request of it.
     let said: Vec<String> = FRAMES.iter().map(|frame| framed(frame, requests[2])).collect();
     talk.declines("frames around what cannot be", &said);
 }
 
-/// A frame that only looks like a request does not make one of what is none.
+/// A frame that looks like a request does not make a request of other words.
 #[test]
 fn a_frame_does_not_make_sense_of_nonsense() {
     let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
@@ -218,7 +218,7 @@ const POLITE_LESSONS: &[(Taught<'_>, &str)] = &[
 
 #[test]
 fn a_polite_lesson_does_not_catch_other_polite_requests() {
-    // What the words of the lessons above do not say.
+    // Words that the lessons above do not contain.
     let known = [
         "open the cabinet",
         "open the drawer",

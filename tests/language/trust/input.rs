@@ -1,9 +1,9 @@
-//! Whatever is typed gets one sentence: never a panic, nothing carried out, and records that fold
-//! again.
+//! For any text there is an answer of one sentence. Nothing panics, nothing is carried out, and the
+//! records fold again.
 
 use super::talk::{Report, Setting, Talk, WASH_MUG, acted, line};
 
-/// Says all of it in one talk. What is refused is refused with one plain sentence.
+/// Says all texts in one talk. A refused text is refused with one plain sentence.
 fn nothing_comes_of(what: &str, said: &[String]) {
     let mut talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
     let mut report = Report::new(what);
@@ -49,7 +49,7 @@ fn very_long_utterances() {
         for words in [100, 140, 1_000, 10_000] {
             said.push(format!("do not {}", unit.repeat(words)));
         }
-        // Below every limit, and still nothing to do.
+        // Within every limit, and still nothing to do.
         said.push(format!("do not {}", unit.repeat(10)));
     }
     nothing_comes_of("very long", &said);

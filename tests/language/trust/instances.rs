@@ -1,11 +1,11 @@
-//! Two or three of a kind: what the words say of number, order, state and place chooses the one, and
-//! what they say and nothing here fits is declined.
+//! Two or three things of a type. Words of number, order, state and place choose one of them. If
+//! the words fit none, the request is declined.
 //!
-//! The answer's bindings name the things, so they are what is checked.
+//! The bindings of the answer name the things, so the tests check these.
 
 use super::talk::{Report, Setting, Talk, bound, line};
 
-/// The last step acts on the things of `expected`, and all before it is getting there.
+/// The last step acts on the things of `expected`, and all steps before it only lead to it.
 fn chooses(talk: &Talk, report: &mut Report, text: &str, expected: &str) {
     let answer = talk.asks(text);
     let found = bound(&answer);
@@ -263,7 +263,7 @@ fn what_was_handled_last_chooses_the_same_and_the_other() {
     report.finish();
 }
 
-/// "Close it" and "turn it off" mean a door or a switch, whatever is in the hand.
+/// "Close it" and "turn it off" mean a door or a switch, whatever the robot holds.
 #[test]
 fn it_means_what_the_verb_can_be_done_to() {
     let held: &[&str] = &["pick up the egg"];
@@ -331,7 +331,7 @@ fn what_no_instance_is_like_is_declined() {
     );
 }
 
-/// Nothing was handled yet, so "the other" says nothing: better to decline than to guess.
+/// Nothing was handled yet, so "the other" chooses nothing. The robot declines and does not guess.
 #[test]
 fn the_other_of_nothing_is_declined() {
     let talk = Talk::new(&Setting::pairs());
@@ -361,7 +361,7 @@ fn the_other_of_nothing_is_declined() {
     );
 }
 
-/// What is asked is refused for what it says, so the person learns of it.
+/// A question is refused because it is a question, so that the person learns this.
 #[test]
 fn a_decline_names_what_did_not_fit() {
     let talk = Talk::new(&Setting::pairs());
@@ -379,7 +379,7 @@ fn a_decline_names_what_did_not_fit() {
     report.finish();
 }
 
-/// Later steps act on what the words chose, not on what is nearest.
+/// Later steps act on the thing that the words chose, not on the nearest.
 #[test]
 fn a_program_keeps_to_the_chosen_thing() {
     let talk = Talk::taught(&Setting::pairs(), &[super::talk::WASH_MUG]);

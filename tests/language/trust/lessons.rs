@@ -1,5 +1,5 @@
-//! What a lesson is for, and what it is not for: its end is where the words put it, another state is
-//! another request, and what is said twice is not done twice.
+//! What a lesson answers and what it does not: the words decide the last place, another state is
+//! another request, and nothing is done twice because it was said twice.
 
 use super::talk::{Report, Setting, Talk, Taught, WASH_MUG, acted, done, line, without_walks};
 
@@ -35,8 +35,8 @@ fn washed(thing: &str, place: &str) -> String {
     )
 }
 
-/// A lesson for the table serves the fridge, whose door the robot opens and shuts, and the other way
-/// about.
+/// A lesson for the table works for the fridge, whose door the robot opens and shuts; and the
+/// reverse.
 #[test]
 fn a_lesson_ends_where_the_words_put_it() {
     let places = [
@@ -57,7 +57,7 @@ fn a_lesson_ends_where_the_words_put_it() {
                     let answer = talk.asks(&text);
                     let expected = washed(kind, place);
                     let right = done(&answer).map(without_walks);
-                    // Not understood is no harm: another place than was named is.
+                    // Not understood is no harm: the words named another place.
                     let right = right.is_none_or(|found| found == expected);
                     report.check(right, || line(&text, &expected, &answer));
                 }
@@ -118,8 +118,8 @@ fn what_is_said_twice_is_not_done_twice() {
     report.finish();
 }
 
-/// "When you are done" says of the last of several clauses what holds anyway; of a single request it
-/// is a condition.
+/// "When you are done" changes nothing in the last of several clauses. In a single request it is a
+/// condition.
 #[test]
 fn the_last_clause_may_be_said_to_be_last() {
     let ends = [
@@ -192,7 +192,7 @@ fn a_tap_is_opened_and_closed_by_turning_it() {
     Talk::new(&Setting::kitchen()).declines("a tap that is off", &close);
 }
 
-/// "Look at" goes to a thing; in a light it asks for more, which only a lesson can answer.
+/// "Look at" goes to a thing. With a light it asks for more, which only a lesson can answer.
 #[test]
 fn looking_in_a_light_is_more_than_going_there() {
     let talk = Talk::new(&Setting::lounge());
@@ -222,7 +222,7 @@ fn looking_in_a_light_is_more_than_going_there() {
     beside.finish();
 }
 
-/// A lesson about the fridge is about no other thing that stands in its words' place.
+/// A lesson about the fridge does not answer for another thing in the same place of the sentence.
 #[test]
 fn a_lesson_about_a_fixture_is_not_for_another_thing() {
     let peek = ("peek into the fridge", "GOTO Fridge; OPEN Fridge; CLOSE Fridge");
@@ -254,7 +254,7 @@ fn a_lesson_about_a_fixture_is_not_for_another_thing() {
     assert!(acted(&talk.asks("please peek into the fridge")), "the same fixture");
 }
 
-/// What a lesson is to be done with is asked for, too: the lesson was done without it.
+/// A tool that the words name is asked for too. The lesson was done without a tool.
 #[test]
 fn a_lesson_is_not_done_without_the_tool_that_was_named() {
     let wash = (

@@ -1,7 +1,8 @@
-//! It never acts on words that it did not understand: each kind of utterance that a person may type,
-//! with neighbours of our own for each kind.
+//! The robot never acts on words that it did not understand. There is one module for each kind of
+//! utterance, with examples of our own.
 //!
-//! `talk.rs` is the harness. Every table reports all its failures at once, with how many were tried.
+//! `talk.rs` is the harness. Every table reports all its failures together, and how many sentences
+//! it tried.
 
 mod carrying;
 mod effects;

@@ -2,13 +2,13 @@
 
 use super::talk::{Setting, Talk, WASH_MUG};
 
-/// A request in the forms that sentences need.
+/// A request in the forms that the sentences need.
 struct Job {
     /// `wash the potato`
     bare: &'static str,
     /// `washing the potato`
     going: &'static str,
-    /// `washed the potato`, as of yesterday
+    /// `washed the potato`, in the past tense
     past: &'static str,
     /// `washed the potato`, after "have"
     perfect: &'static str,
@@ -297,12 +297,13 @@ fn sentences(jobs: &[Job], moulds: &[&str]) -> Vec<String> {
     jobs.iter().flat_map(|job| moulds.iter().map(|mould| filled(job, mould))).collect()
 }
 
-/// After a lesson, and for what everybody starts with: the same moulds.
+/// The same sentence patterns after a lesson, and for the requests that everybody can make at the
+/// start.
 fn nothing_is_done(what: &str, moulds: &[&str]) {
     let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
     talk.declines(&format!("{what}, with a lesson"), &sentences(&LESSON, moulds));
     talk.declines(&format!("{what}, primitives"), &sentences(&PRIMITIVES, moulds));
-    // Before the first lesson it must be as safe.
+    // Before the first lesson it must be just as safe.
     let talk = Talk::new(&Setting::kitchen());
     talk.declines(&format!("{what}, nothing taught"), &sentences(&PRIMITIVES, moulds));
 }
@@ -351,7 +352,7 @@ fn what_has_a_condition_is_not_done() {
     nothing_is_done("conditional", CONDITIONAL);
 }
 
-/// A long instruction that waits from its beginning is no lesson's, however near that is.
+/// A long instruction that waits at its beginning is not answered by a lesson, however near it is.
 #[test]
 fn a_long_request_that_waits_from_its_beginning_is_not_done() {
     let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
@@ -373,7 +374,8 @@ fn what_is_for_later_is_not_done() {
     nothing_is_done("later", LATER);
 }
 
-/// The sentences that have no "not" in front and no mark behind: how people type in haste.
+/// The same sentences without "not" at the front and without a mark at the end, as people type in a
+/// hurry.
 #[test]
 fn moods_are_seen_in_capitals_and_without_marks() {
     let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
@@ -410,7 +412,7 @@ fn moods_are_seen_in_capitals_and_without_marks() {
     );
 }
 
-/// These are not questions about the kitchen either; the answer is that they are not understood.
+/// These are no questions about the kitchen either. They are not understood.
 #[test]
 fn a_mood_is_no_impossible_request() {
     let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);

@@ -1,9 +1,9 @@
-//! What is understood and cannot be is said to be impossible. No far lesson and no other kind of
-//! thing is taken in its place.
+//! A request that is understood and cannot be done is impossible. No far lesson and no other kind
+//! of thing takes its place.
 
 use super::talk::{Report, Setting, Talk, acted, line, reason};
 
-/// Lessons whose words are near to many requests, and whose programs could always run.
+/// Lessons whose words are near to many requests, and whose programs can always run.
 const FAR: &[(&str, &str)] = &[
     ("turn the tap on and off", "GOTO Faucet; TOGGLE Faucet; TOGGLE Faucet"),
     ("open and shut the drawer", "GOTO Drawer; OPEN Drawer; CLOSE Drawer"),
@@ -14,7 +14,7 @@ const FAR: &[(&str, &str)] = &[
     ),
 ];
 
-/// What is off, what is open, what runs, and what is in the hand, from the start.
+/// What is off, open and on, and what the robot holds, at the start.
 fn half_done() -> Setting {
     let setting = Setting::kitchen().with("Fridge", "open").with("Toaster", "on");
     setting.with("Microwave", "on")
@@ -48,7 +48,7 @@ fn a_seed_that_the_world_forbids_stays_impossible() {
         ("pick up the fridge", "cannot be picked up"),
         ("pick up the counter", "cannot be picked up"),
     ];
-    // With nothing taught and with lessons near by: the same.
+    // The same with no lessons and with near lessons.
     Talk::new(&half_done()).is_impossible("forbidden by the world", cases);
     let talk = Talk::taught_in(&Setting::kitchen(), FAR, &half_done());
     talk.is_impossible("forbidden by the world, after far lessons", cases);
@@ -74,7 +74,7 @@ fn a_full_hand_is_no_reason_for_another_program() {
     );
 }
 
-/// A kitchen of three things, for what is and what is not there.
+/// A kitchen of three things, for things that are here and things that are not.
 fn with_only(kind: &str) -> Setting {
     Setting::read(&format!(
         "room = \"kitchen\"\nstands_at = \"CounterTop\"\n\
@@ -84,7 +84,8 @@ fn with_only(kind: &str) -> Setting {
     ))
 }
 
-/// A name, the type it means, and a type it was used for now and then, which alone is here.
+/// A name, the type that it means, and a type that it was sometimes used for. Only the second type
+/// is here.
 const SELDOM: &[(&str, &str, &str)] = &[
     ("bowl", "Bowl", "Cup"),
     ("bowl", "Bowl", "Plate"),
@@ -120,7 +121,7 @@ fn a_kind_is_not_replaced_by_another() {
             let here = format!("beside a {alone} alone, {text}");
             report.check(!acted(&answer), || line(&here, &format!("no {kind}"), &answer));
         }
-        // The first wording of all is answered with the reason.
+        // The first wording gets an answer with the reason.
         let answer = talk.asks(&format!("pick up the {name}"));
         let named = reason(&answer).is_some_and(|reason| {
             let reason = reason.replace(' ', "");
@@ -174,7 +175,7 @@ fn what_is_not_here_is_said_not_to_be_here() {
     );
 }
 
-/// "Open the cabinet" a second time does not open the drawer, which is called a cabinet now and then.
+/// "Open the cabinet" a second time does not open the drawer, which is sometimes called a cabinet.
 #[test]
 fn what_is_done_already_does_not_slide_to_another_kind() {
     let setting = Setting::kitchen().with("Cabinet", "open");
@@ -239,7 +240,7 @@ fn a_sure_seed_is_not_a_lesson_with_the_same_verb() {
     );
 }
 
-/// A name leads to its own type while a thing of that type is in the room.
+/// A name means its own type if a thing of that type is in the room.
 #[test]
 fn a_full_name_leads_to_its_own_type() {
     let kitchen = |things: [&str; 2]| {

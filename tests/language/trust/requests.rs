@@ -1,4 +1,4 @@
-//! Several requests in one utterance: all of them, in the order that the words give, or none.
+//! Several requests in one utterance: all are done in the order of the words, or none.
 
 use apprentice::language::{Program, Step};
 
@@ -7,7 +7,7 @@ use super::talk::{Report, Setting, Talk, WASH_MUG, done, line};
 const WASH_POTATO: &str =
     "PICKUP Potato; PUT Potato SinkBasin; TOGGLE Faucet; TOGGLE Faucet; PICKUP Potato";
 
-/// The expected steps stand in the program in this order, and the rest is getting there.
+/// The expected steps are in the program in this order. All other steps only lead to them.
 fn is_whole(program: &Program, expected: &str) -> bool {
     let expected: Program = expected.parse().unwrap();
     let mut wanted = expected.steps.iter().peekable();
@@ -92,7 +92,7 @@ fn two_objects_of_one_verb_are_two_steps() {
     );
 }
 
-/// The robot has one hand, and a door that is open cannot be opened: then none of the two is done.
+/// The robot has one hand, and an open door cannot be opened. Then neither request is done.
 #[test]
 fn two_objects_of_which_one_cannot_be_are_none() {
     let half = Setting::kitchen().with("Fridge", "open").with("Toaster", "on");
@@ -149,7 +149,7 @@ fn each_clause_is_read_in_the_state_that_the_one_before_leaves() {
     );
 }
 
-/// What is worked twice is worked for something that was not said, and is declined.
+/// Using one thing twice is a means to something that was not said, so it is declined.
 #[test]
 fn turning_on_and_off_at_once_is_both_or_neither() {
     all_or_none(
@@ -187,7 +187,7 @@ fn a_lesson_and_something_else_are_both_done_or_neither() {
     ];
     let cases: Vec<(&str, &str)> = cases.iter().map(|(text, all)| (*text, all.as_str())).collect();
     all_or_none(&talk, "a lesson and more", &cases);
-    // The potato is in the hand when the washing is done, so these cannot follow.
+    // The robot holds the potato after the washing, so these cannot follow.
     talk.declines(
         "a lesson and what the hand forbids",
         &[
@@ -330,7 +330,8 @@ fn more_words_between_do_not_drop_a_clause() {
     );
 }
 
-/// Two things are put one after the other, fetched where that is composed, or neither is.
+/// Two things are put one after the other, with fetching if the recipe composes it; or neither is
+/// put.
 #[test]
 fn two_things_of_one_put_are_two_errands() {
     let two = |one: &str, other: &str, place: &str| {

@@ -1,8 +1,8 @@
 //! One person and their robot in a scene, without threads, a log or a service.
 //!
-//! Everything is said through a session, as a service does it: what is said is recorded, encoded,
-//! decoded and applied. So memory of what was handled last, and which things were chosen, count here
-//! as they count there.
+//! Everything is said to a session, as in a service. Each utterance is recorded, encoded, decoded
+//! and applied. So the memory of what was handled last, and of which things were chosen, works as
+//! in a service.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
@@ -18,17 +18,17 @@ use apprentice::world::{Domain, Stage, View};
 
 use apprentice_testkit::recorded::recorded;
 
-/// The recipe that all these tests are about.
+/// The recipe under test.
 pub const RECIPE: &str = "default-2";
 
-/// What washing is, taught with the mug that stands beside the robot.
+/// What washing is, taught with the mug next to the robot.
 pub const WASH_MUG: (&str, &str) = (
     "wash the mug",
     "GOTO Mug; PICKUP Mug; GOTO SinkBasin; PUT Mug SinkBasin; TOGGLE Faucet; TOGGLE Faucet; \
      PICKUP Mug",
 );
 
-/// What somebody said, and the program that they taught it to mean.
+/// An utterance, and the program that was taught for it.
 pub type Taught<'a> = (&'a str, &'a str);
 
 struct House {
@@ -44,7 +44,7 @@ static HOUSE: LazyLock<House> = LazyLock::new(|| {
     House { domain: Arc::new(Household::new()), recipe_text, recipe }
 });
 
-/// Minds by what they were taught; a mind is the same for every test that taught the same.
+/// Minds by their lessons. Tests with the same lessons use the same mind.
 static MINDS: Mutex<BTreeMap<String, Arc<Mind>>> = Mutex::new(BTreeMap::new());
 
 fn stage(setting: &Setting) -> (Scene, Task) {
@@ -83,7 +83,7 @@ pub struct Talk {
     requests: u128,
 }
 
-/// A session is not copied but folded again, as when its user wakes.
+/// A session is not copied. It is folded again, as when its user wakes.
 impl Clone for Talk {
     fn clone(&self) -> Talk {
         let mut session = Session::new(HOUSE.domain.clone());
@@ -100,12 +100,12 @@ impl Talk {
         Talk::taught(setting, &[])
     }
 
-    /// The lessons were taught in the setting as it is now.
+    /// The lessons were taught in the present setting.
     pub fn taught(setting: &Setting, lessons: &[Taught<'_>]) -> Talk {
         Talk::taught_in(setting, lessons, setting)
     }
 
-    /// The lessons were taught in one setting; the talk is in another.
+    /// The lessons were taught in one setting. The talk is in another.
     pub fn taught_in(taught: &Setting, lessons: &[Taught<'_>], setting: &Setting) -> Talk {
         let mind = mind(taught, lessons);
         let session = Session::new(HOUSE.domain.clone());
@@ -120,7 +120,7 @@ impl Talk {
         talk
     }
 
-    /// Goes on after these sentences, which must be understood.
+    /// Continues after these sentences, which must be understood.
     pub fn after(mut self, said: &[&str]) -> Talk {
         for text in said {
             let answer = self.says(text);
@@ -129,7 +129,7 @@ impl Talk {
         self
     }
 
-    /// What would be answered now. Nothing changes.
+    /// The answer that would be given now. Nothing changes.
     pub fn asks(&self, text: &str) -> Answer {
         let command = Command::Say { utterance: text.to_owned() };
         let turn = self.proposes(&command, self.requests + 1);
@@ -141,12 +141,12 @@ impl Talk {
         answers.last().unwrap_or_else(|| panic!("{text:?} has no answer"))
     }
 
-    /// Says it, and what is understood is carried out.
+    /// Says it. If it is understood, it is carried out.
     pub fn says(&mut self, text: &str) -> Answer {
         self.tries(text).unwrap_or_else(|refused| panic!("{text:?} is refused: {refused}"))
     }
 
-    /// - errors: the sentence of the refusal, for what is no utterance.
+    /// - errors: the sentence of the refusal, if the text is no utterance.
     pub fn tries(&mut self, text: &str) -> Result<Answer, Rejection> {
         let first = self.records.len();
         self.give(&Command::Say { utterance: text.to_owned() })?;
@@ -166,7 +166,7 @@ impl Talk {
         }
     }
 
-    /// Proposes and makes true, as an actor and a log would.
+    /// Proposes and applies, as an actor and a log do.
     fn give(&mut self, command: &Command) -> Result<(), Rejection> {
         self.requests += 1;
         let turn = self.proposes(command, self.requests)?;
@@ -220,7 +220,7 @@ impl Talk {
         report.finish();
     }
 
-    /// Understood, and the world forbids it for a reason that has `part` in it.
+    /// Understood, but the world forbids it. The reason contains `part`.
     pub fn is_impossible(&self, what: &str, said: &[(&str, &str)]) {
         let mut report = Report::new(what);
         for (text, part) in said {
@@ -241,7 +241,7 @@ impl Talk {
         report.finish();
     }
 
-    /// Carried out, with this program but for the walks, which the test leaves open.
+    /// Carried out, with this program. Walks do not count.
     pub fn acts<S: AsRef<str>>(&self, what: &str, said: &[(S, &str)]) {
         let mut report = Report::new(what);
         for (text, program) in said {
@@ -308,7 +308,7 @@ pub fn without_walks(program: &Program) -> String {
     steps.map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 
-/// What a table found. Collects every failure, so that one run shows how far a kind is from right.
+/// The results of a table. It collects every failure, so that one run shows all of them.
 pub struct Report {
     what: String,
     tried: usize,
@@ -327,12 +327,12 @@ impl Report {
         }
     }
 
-    /// - panics: when anything is wrong.
+    /// - panics: if anything is wrong.
     pub fn finish(self) {
         self.finish_with(0);
     }
 
-    /// - panics: when more than `allowed` are wrong, or nothing was tried.
+    /// - panics: if more than `allowed` are wrong, or nothing was tried.
     pub fn finish_with(self, allowed: usize) {
         let Report { what, tried, wrong } = self;
         assert!(tried > 0, "{what}: nothing was tried");
@@ -342,7 +342,7 @@ impl Report {
     }
 }
 
-/// A scene file that a test changes a little before it is played.
+/// A scene file that a test changes before it is played.
 #[derive(Clone)]
 pub struct Setting(toml::Table);
 
@@ -392,7 +392,7 @@ impl Setting {
         self
     }
 
-    /// The thing's one state.
+    /// The single state of the thing.
     pub fn with(mut self, name: &str, state: &str) -> Setting {
         let states = toml::Value::Array(vec![state.into()]);
         self.thing(name).insert("states".to_owned(), states);

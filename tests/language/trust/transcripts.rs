@@ -1,4 +1,4 @@
-//! Conversations with the answers that one would expect, played against a real service.
+//! Conversations with the answers that a person would expect, played on a real service.
 
 use std::path::PathBuf;
 use std::sync::Arc;

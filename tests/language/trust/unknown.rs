@@ -1,15 +1,15 @@
-//! An unknown thing is named as unknown, and nothing known beside it is taken in its place. Words
-//! that change a request and that nothing used are no reason to do a part of it.
+//! An unknown thing is named as unknown, and no known thing near it takes its place. If words that
+//! change a request were not used, no part of it is done.
 
 use super::talk::{Report, Setting, Talk, WASH_MUG, acted, line};
 
-/// Things that the household has no name for.
+/// Things for which the household has no name.
 const UNKNOWN: [&str; 14] = [
     "banana", "hammer", "guitar", "carrot", "umbrella", "whistle", "stapler", "violin", "wrench",
     "trumpet", "lantern", "helmet", "balloon", "broom",
 ];
 
-/// Each with a known thing that may stand there.
+/// Each with a known thing that may be in the same place.
 const PLACES: [&str; 10] = [
     "next to the mug",
     "beside the potato",
@@ -92,7 +92,7 @@ fn an_unknown_name_alone_is_not_understood() {
     talk.declines("unknown names", &said);
 }
 
-/// The known word says only what the unknown thing is for, or of.
+/// The known word only says what the unknown thing is for, or of.
 #[test]
 fn a_known_word_in_an_unknown_name_is_not_the_thing() {
     let talk = Talk::taught(&Setting::kitchen(), &[WASH_MUG]);
@@ -150,7 +150,7 @@ fn an_unknown_thing_in_one_of_two_clauses_stops_both() {
     talk.declines("an unknown thing in one clause", &said);
 }
 
-/// A program names single things, so a set can only be done in part.
+/// A program names single things, so for a set it could only do a part.
 #[test]
 fn sets_are_not_done_in_part() {
     let talk = Talk::new(&Setting::pairs());
@@ -348,7 +348,7 @@ fn a_correction_is_not_passed_over() {
     );
 }
 
-/// A word in the object that nothing used.
+/// An unused word in the object.
 #[test]
 fn what_the_object_is_said_to_be_counts() {
     let talk = Talk::new(&Setting::kitchen());

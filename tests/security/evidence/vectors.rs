@@ -1,4 +1,4 @@
-//! Proofs good and bad of a small log, with everything fixed that is otherwise random.
+//! Good and bad proofs of a small log. Everything that is otherwise random is fixed.
 
 use apprentice::events::{Batch, Event, Head, Header, SessionClosed};
 use apprentice::evidence::{
@@ -7,7 +7,7 @@ use apprentice::evidence::{
 use apprentice::ids::{Digest, RequestId, Seq, StreamKey, Timestamp};
 use apprentice::store::{DataKey, Draft, SeededEntropy};
 
-/// A file for the folder `schema/golden/proofs`; the first word of its name says what it is.
+/// A file for the folder `schema/golden/proofs`. The first word of its name says what it is.
 pub struct Vector {
     pub name: String,
     pub proof: Vec<u8>,
@@ -29,7 +29,7 @@ fn data_key() -> DataKey {
     DataKey::from_bytes(*b"a key that protects nothing.....")
 }
 
-/// Segments of so many records, one person each.
+/// Segments with these numbers of records, one person each.
 struct Log {
     frames: Vec<Vec<Vec<u8>>>,
     segments: Vec<Segment>,
@@ -244,7 +244,7 @@ fn log_of_one() -> Log {
     log(&[2])
 }
 
-/// Draws that are the same each time, named by what they are for.
+/// Draws that are always the same, named by their purpose.
 pub struct Draws {
     purpose: &'static str,
     count: u64,
