@@ -1,7 +1,7 @@
 //! The simulator: one seed decides what people of two labs say, which appends fail or hang, who
-//! crashes, wakes, sleeps and is erased when, which caches are lost and how requests are repeated
-//! and reordered. The seats, the directory and the tenant registry are the shipped ones. No socket,
-//! no thread, no sleep. The fold of the log is the oracle (`docs/reliability.md`).
+//! crashes, wakes, sleeps and is erased when, what operators order, which caches are lost and how
+//! requests are repeated and reordered. The seats, the directory and the tenants' writer are the
+//! shipped ones. No socket, no thread, no sleep. The fold of the log is the oracle (`docs/reliability.md`).
 //!
 //! `cargo xtask simulate --seeds N [--seed S]` runs as many seeds as wanted.
 
@@ -18,8 +18,10 @@ mod dice;
 mod disturbed;
 mod drive;
 mod oracle;
+mod orders;
 mod people;
 mod process;
+mod registrar;
 mod system;
 
 use std::sync::Mutex;
@@ -33,7 +35,7 @@ use system::System;
 
 /// Moves of one seed: many short lives, and a long one in ten.
 fn moves(seed: u64) -> usize {
-    if seed.is_multiple_of(10) { 2_400 } else { 480 }
+    if seed.is_multiple_of(10) { 2_700 } else { 540 }
 }
 
 /// Seeds of the test command; `APPRENTICE_SEEDS` and `APPRENTICE_SEED` choose others.

@@ -1,24 +1,27 @@
-//! One process of the service: the shipped directory, seats and tenant registry, each with its
+//! One process of the service: the shipped directory, seats and tenants' writer, each with its
 //! mailbox. What actix does in the service is done here one step at a time, when dice say so.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use apprentice::actors::{
-    Attention, Directory, DirectoryInput, NewSession, PersonAsk, Presence, Seat, TenantRegistry,
-    Timer,
+    Attention, Directory, DirectoryInput, NewSession, PersonAsk, Presence, Seat, TenantWork,
+    TenantWriter, Timer, WriterInput,
 };
 use apprentice::ids::{Digest, RequestId, StreamId, UserId};
 use apprentice::learning::{Lesson, Mind, Recipe};
 use apprentice::replay::Minds;
 use apprentice::session::Session;
 use apprentice::store::Pending;
+use apprentice::tenancy::{Admissions, Clock};
 use apprentice::world::Domain;
 
 use crate::support::toy::Bells;
 
 /// Requests that wait for one seat.
 pub const MAILBOX_MAX: usize = 2;
+/// Work that waits for one registrar.
+pub const WORK_MAX: usize = 6;
 
 /// What one process holds in memory, lost when it dies.
 pub struct Process {
@@ -27,12 +30,46 @@ pub struct Process {
     /// By generation.
     pub actors: BTreeMap<u64, Actor>,
     pub minds: Minds,
-    /// None until it is needed, and when it could not be read.
-    pub registry: Option<TenantRegistry>,
+    pub registrar: Registrar,
     /// Numbers of the requests that this process has taken and not answered.
     pub unanswered: BTreeSet<u64>,
     /// It was told to stop: whoever sleeps stays asleep.
     pub stops: bool,
+}
+
+/// The tenants' writer, and what waits for it.
+pub struct Registrar {
+    /// None until it is needed, and when the log could not be read.
+    pub writer: Option<TenantWriter<Caller>>,
+    pub doors: Admissions,
+    pub queue: VecDeque<(TenantWork, Caller)>,
+    pub pending: Option<Pending>,
+    /// The end of what was carried out last, not told yet.
+    pub end: Option<WriterInput<Caller>>,
+    /// Whose work it does.
+    pub current: Option<Caller>,
+    /// With a defect: a key that is destroyed later.
+    pub spared: Option<StreamId>,
+}
+
+/// Who waits for the end of work.
+#[derive(Debug, Clone)]
+pub struct Caller {
+    pub number: u64,
+    pub whom: Whom,
+}
+
+#[derive(Debug, Clone)]
+pub enum Whom {
+    /// Who gave an order, by its number.
+    Operator(usize),
+    Auditor,
+    /// A seat, which hears nothing.
+    Seat,
+    /// The directory, while a person is erased.
+    Directory(StreamId),
+    /// The start of the process, which finishes what the one before left.
+    Start,
 }
 
 /// A way back: whom to answer.
@@ -97,13 +134,13 @@ pub struct Job {
 }
 
 impl Process {
-    pub fn new(awake_max: usize) -> Process {
+    pub fn new(awake_max: usize, clock: &Clock) -> Process {
         Process {
             directory: Directory::new(awake_max),
             to_directory: VecDeque::new(),
             actors: BTreeMap::new(),
             minds: Minds::default(),
-            registry: None,
+            registrar: Registrar::new(clock),
             unanswered: BTreeSet::new(),
             stops: false,
         }
@@ -127,7 +164,27 @@ impl Process {
 
     /// Whether everything that came in was worked off, but for timers and trainings.
     pub fn is_quiet(&self) -> bool {
-        self.to_directory.is_empty() && self.actors.values().all(|actor| !actor.can_act())
+        self.to_directory.is_empty()
+            && self.actors.values().all(|actor| !actor.can_act())
+            && !self.registrar.can_act()
+    }
+}
+
+impl Registrar {
+    fn new(clock: &Clock) -> Registrar {
+        Registrar {
+            writer: None,
+            doors: Admissions::new(clock.clone()),
+            queue: VecDeque::new(),
+            pending: None,
+            end: None,
+            current: None,
+            spared: None,
+        }
+    }
+
+    pub fn can_act(&self) -> bool {
+        self.pending.is_some() || self.end.is_some() || !self.queue.is_empty()
     }
 }
 
