@@ -222,7 +222,7 @@ impl System {
             Move::Order => self.order(process)?,
             Move::Sign => self.ask_to_sign(process)?,
             // The rightful process alone erases people.
-            Move::Erase if self.dice.chance(30) => self.ask_to_erase(person),
+            Move::Erase if self.dice.chance(60) => self.ask_to_erase(person),
             Move::Erase => {}
             Move::CrashAll if self.dice.chance(40) => self.crash_all()?,
             Move::CrashAll => {}
