@@ -1,5 +1,6 @@
 //! Who is awake: one mailbox for each person, one pool of trainers, one directory for all. What
-//! they decide stands in `seat/` and `directory/`, without actix; the actors carry it out.
+//! they decide stands in `seat/`, `directory/` and `registrar/`, without actix; the actors carry it
+//! out.
 
 mod archive;
 mod awake;
@@ -16,7 +17,6 @@ mod seat;
 mod shared;
 mod submit;
 mod system;
-mod tenant_registry;
 mod trainer;
 mod user;
 
@@ -30,8 +30,10 @@ pub use meters::{Refusals, Usage};
 pub use notifications::{CommitNotification, CommitNotifications};
 pub use operator::list_tenants;
 pub use presence::{Attention, Presence};
-pub use registrar::{Erased, Obeyed, Registrar, Signed};
+pub use registrar::{
+    Done, Erased, Moment, Obeyed, OrderError, Registrar, Signed, TenantRegistry, TenantWork,
+    TenantWriter, WriterEffect, WriterInput, fold as fold_tenant, fold_all as fold_tenants,
+};
 pub use seat::{Effect, Input, NewSession, Seat, Timer};
 pub use submit::{AnswerTo, Submit};
 pub use system::{ActorSettings, ActorSystem, ActorsError, Front, NotTaken, Wakings};
-pub use tenant_registry::{OrderError, TenantRegistry, fold as fold_tenant};

@@ -1,8 +1,7 @@
-//! The simulator. One seed decides what people of two labs say, which appends fail or hang, when
-//! somebody crashes, wakes, sleeps or is erased, which caches are lost, and how requests are
-//! repeated and reordered. The seats, the directory and the tenant registry are the shipped ones.
-//! There is no socket, no thread and no sleep. The fold of the log is the oracle
-//! (`docs/reliability.md`).
+//! The simulator: one seed decides what people of two labs say, which appends fail or hang, who
+//! crashes, wakes, sleeps and is erased when, what operators order, which caches are lost and how
+//! requests are repeated and reordered. The seats, the directory and the tenants' writer are the
+//! shipped ones. No socket, no thread, no sleep. The fold of the log is the oracle (`docs/reliability.md`).
 //!
 //! `cargo xtask simulate --seeds N [--seed S]` runs any number of seeds.
 
@@ -11,8 +10,10 @@ mod defects;
 mod disturbed;
 mod drive;
 mod oracle;
+mod orders;
 mod people;
 mod process;
+mod registrar;
 mod system;
 
 use std::sync::Mutex;
@@ -26,7 +27,7 @@ use system::System;
 
 /// Moves of one seed. Every tenth seed has a long run.
 fn moves(seed: u64) -> usize {
-    if seed.is_multiple_of(10) { 2_400 } else { 480 }
+    if seed.is_multiple_of(10) { 2_700 } else { 540 }
 }
 
 /// Number of seeds in the test command; `APPRENTICE_SEEDS` and `APPRENTICE_SEED` choose others.

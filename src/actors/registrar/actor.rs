@@ -5,13 +5,13 @@ use std::time::Instant;
 use actix::{Actor, Addr, Handler, Message, SyncArbiter, SyncContext};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::awake::Awake;
-use super::{Failure, OrderError, TenantRegistry};
+use super::{OrderError, TenantRegistry};
+use crate::actors::Failure;
+use crate::actors::awake::Awake;
 use crate::events::{Event, PersonErased};
 use crate::ids::{StreamId, TenantId};
 use crate::limits::REGISTRAR_QUEUE_MAX;
 use crate::replay::Through;
-use crate::store::AppendError;
 use crate::tenancy::{Admissions, Order};
 
 /// Where orders about tenants are handed in while a service runs. One thread carries them out, one
@@ -32,10 +32,7 @@ pub type Signed = Result<String, OrderError>;
 /// Seconds between two checkpoints of one tenant that nobody asked for.
 const CHECKPOINT_EVERY_S: u64 = 60;
 
-struct RegistrarWorker {
-    registrations: Arc<Mutex<Registrations>>,
-    failure: Failure,
-}
+struct RegistrarWorker(Arc<Mutex<Registrations>>);
 
 struct Registrations {
     tenant_registry: TenantRegistry,
@@ -85,21 +82,19 @@ struct Erase {
 
 impl Registrar {
     /// Must run on the actix system's thread.
-    pub(super) fn start(
-        tenant_registry: TenantRegistry,
+    pub(in crate::actors) fn start(
+        mut tenant_registry: TenantRegistry,
         open: Awake,
         failure: Failure,
     ) -> Registrar {
+        tenant_registry.report_to(failure);
         let admissions = tenant_registry.admissions().clone();
         let registrations = Arc::new(Mutex::new(Registrations {
             tenant_registry,
             signed: BTreeMap::new(),
             _open: open,
         }));
-        let address = SyncArbiter::start(1, move || RegistrarWorker {
-            registrations: registrations.clone(),
-            failure: failure.clone(),
-        });
+        let address = SyncArbiter::start(1, move || RegistrarWorker(registrations.clone()));
         Registrar { address, places: Arc::new(Semaphore::new(REGISTRAR_QUEUE_MAX)), admissions }
     }
 
@@ -133,7 +128,11 @@ impl Registrar {
     }
 
     /// Erases a person for whom nobody speaks any more; `answer` as in [`Registrar::order`].
-    pub(super) fn erase(&self, stream: StreamId, answer: impl FnOnce(Erased) + Send + 'static) {
+    pub(in crate::actors) fn erase(
+        &self,
+        stream: StreamId,
+        answer: impl FnOnce(Erased) + Send + 'static,
+    ) {
         self.hand_in(answer, |answer, _place| Erase { stream, answer, _place });
     }
 
@@ -218,17 +217,8 @@ impl Drop for Registrations {
 }
 
 impl RegistrarWorker {
-    /// A log that is poisoned ends the service.
-    fn look_at(&self, error: Option<&OrderError>) {
-        if let Some(OrderError::Append { error, .. }) = error
-            && matches!(error, AppendError::Poisoned { .. } | AppendError::Gone)
-        {
-            self.failure.report(error.to_string());
-        }
-    }
-
     fn registrations(&self) -> MutexGuard<'_, Registrations> {
-        self.registrations.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -239,7 +229,6 @@ impl Handler<Close> for RegistrarWorker {
         let closed = self.registrations().close(&close.stream);
         if let Err(error) = closed {
             tracing::warn!(stream = %close.stream, %error, "segments are left to be closed later");
-            self.look_at(Some(&error));
         }
     }
 }
@@ -255,7 +244,6 @@ impl Handler<SignTree> for RegistrarWorker {
             registrations.signed.insert(tenant, (Instant::now(), false));
         }
         drop(registrations);
-        self.look_at(signed.as_ref().err());
         answer(signed);
     }
 }
@@ -266,7 +254,6 @@ impl Handler<Obey> for RegistrarWorker {
     fn handle(&mut self, obey: Obey, _: &mut SyncContext<Self>) {
         let Obey { tenant, order, answer, _place } = obey;
         let obeyed = self.registrations().tenant_registry.obey(&tenant, &order);
-        self.look_at(obeyed.as_ref().err());
         answer(obeyed);
     }
 }
@@ -277,7 +264,6 @@ impl Handler<Erase> for RegistrarWorker {
     fn handle(&mut self, erase: Erase, _: &mut SyncContext<Self>) {
         let Erase { stream, answer, _place } = erase;
         let erased = self.registrations().tenant_registry.erase(&stream);
-        self.look_at(erased.as_ref().err());
         answer(erased);
     }
 }
