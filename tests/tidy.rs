@@ -148,15 +148,20 @@ fn is_test(file: &str) -> bool {
 
 /// The rooms that a source text names as `crate::room`, nested imports included.
 fn rooms_named(text: &str) -> BTreeSet<String> {
+    named_behind("crate::", text)
+}
+
+/// The names that follow `path` in a source text, nested imports included.
+fn named_behind(path: &str, text: &str) -> BTreeSet<String> {
     let name = |rest: &str| -> String {
         rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
     };
     let mut found = BTreeSet::new();
-    for (place, _) in text.match_indices("crate::") {
+    for (place, _) in text.match_indices(path) {
         if text[..place].ends_with('$') {
             continue;
         }
-        let rest = &text[place + "crate::".len()..];
+        let rest = &text[place + path.len()..];
         match rest.strip_prefix('{') {
             Some(list) => {
                 let mut depth = 0;
@@ -214,6 +219,61 @@ fn rooms_import_only_what_the_map_allows() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A source text without the module `tests` at its end.
+fn product(text: &str) -> &str {
+    text.split("#[cfg(test)]\nmod tests {").next().unwrap()
+}
+
+/// The folders and files of the store, and the files of each folder, from each to those it imports.
+fn arrows_in_the_store() -> BTreeMap<String, BTreeSet<String>> {
+    let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (file, text) in sources() {
+        let Some(below) = file.strip_prefix("store/") else { continue };
+        if is_test(&file) || below == "mod.rs" {
+            continue;
+        }
+        let unit = room(below);
+        let mut named = named_behind("crate::store::", product(&text));
+        for name in &named {
+            let fine = place_of(&format!("store/{name}")).is_some();
+            assert!(fine, "src/{file} imports `store::{name}`; name the file that holds it");
+        }
+        named.remove(unit);
+        arrows.entry(unit.to_owned()).or_default().extend(named);
+        // A folder's `mod.rs` declares the files beside it.
+        if let Some((folder, name)) = below.rsplit_once('/').filter(|(_, name)| *name != "mod.rs") {
+            let beside = named_behind("super::", product(&text)).into_iter();
+            let beside = beside.map(|name| format!("{folder}/{name}"));
+            let beside = beside.filter(|name| place_of(&format!("store/{name}")).is_some());
+            let name = format!("{folder}/{}", room(name));
+            arrows.entry(name).or_default().extend(beside);
+        }
+    }
+    arrows
+}
+
+/// What is left when everything is taken away that imports nothing that is left.
+fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    loop {
+        let before = arrows.len();
+        let left: BTreeSet<String> = arrows.keys().cloned().collect();
+        arrows.retain(|_, named| named.iter().any(|name| left.contains(name)));
+        if arrows.len() == before {
+            return left.into_iter().collect();
+        }
+    }
+}
+
+#[test]
+fn imports_inside_the_store_make_no_circle() {
+    let arrows = arrows_in_the_store();
+    assert!(arrows.len() > 30 && arrows["directory"].contains("sled"), "{arrows:?}");
+    assert_eq!(circle(arrows), Vec::<String>::new());
+    let arrow = |from: &str, to: &str| (from.to_owned(), BTreeSet::from([to.to_owned()]));
+    let round = BTreeMap::from([arrow("a", "b"), arrow("b", "c"), arrow("c", "b")]);
+    assert_eq!(circle(round).len(), 3, "the check can fail");
 }
 
 #[test]

@@ -6,9 +6,12 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::super::conformance::{batch, read_all, stream};
-use super::super::{OpenError, OsEntropy, Store, open};
 use super::*;
+use crate::store::directory::error::OpenError;
+use crate::store::directory::open::open;
+use crate::store::directory::store::Store;
+use crate::store::sealing::entropy::OsEntropy;
+use crate::store::testing::conformance::{batch, read_all, stream};
 
 /// Longer than any group takes that does not hang.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -11,8 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::Shared;
-use crate::store::AppendError;
-use crate::store::log::Promise;
+use crate::store::log::{AppendError, Promise};
 
 /// The promises of the group that is being made durable. Whoever takes them out answers them.
 #[derive(Default)]
