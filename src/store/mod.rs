@@ -14,6 +14,7 @@ mod log;
 mod memory;
 mod sealing;
 mod sled;
+#[cfg(feature = "testing")]
 pub mod testing;
 
 pub use self::caches::models::ModelStore;
@@ -37,4 +38,5 @@ pub use self::sealing::entropy::{Entropy, OsEntropy, SeededEntropy};
 pub use self::sealing::keys::{KeyError, Keys};
 pub use self::sealing::seal::{DataKey, Draft, Sealed, Walk};
 pub use self::sled::{Damage, SledLog};
+#[cfg(feature = "testing")]
 pub use self::testing::{conformance, decoders};

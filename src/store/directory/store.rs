@@ -51,11 +51,6 @@ impl Store {
         Store { log, ..self }
     }
 
-    /// In memory, around another log (a `FaultyLog`, a seeded one).
-    pub fn around(log: Arc<dyn EventLog>, keys: Arc<Keys>) -> Store {
-        Store::of(log, Arc::new(MemoryCache::default()), keys)
-    }
-
     /// Destroys a person's key, and drops their minds, their snapshots and, in the tenant of the
     /// single-user default, what was typed at the terminal. The chains still verify. Repeating it
     /// is harmless.

@@ -8,6 +8,7 @@ use crate::events::{
 };
 use crate::ids::{Digest, RequestId, Seq, StreamId, StreamKey, TenantId, Timestamp, UserId};
 use crate::limits::{BATCH_EVENTS_MAX, KEY_FILE_BYTES, RECORD_BYTES_MAX, STORE_VALUE_BYTES_MAX};
+use crate::store::caches::cache::MemoryCache;
 use crate::store::directory::store::Store;
 use crate::store::log::{AppendError, EventLog, ReadError, SealedRecord};
 use crate::store::sealing::entropy::OsEntropy;
@@ -383,6 +384,13 @@ fn everything_is_there_after_reopening(subject: Subject) {
             *head = more.head();
             records.extend_from_slice(more.records());
         }
+    }
+}
+
+impl Store {
+    /// In memory, around another log: one with faults, or a seeded one.
+    pub fn around(log: Arc<dyn EventLog>, keys: Arc<Keys>) -> Store {
+        Store::of(log, Arc::new(MemoryCache::default()), keys)
     }
 }
 
