@@ -2,10 +2,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use crate::events::Durable;
 use crate::fairness::{Room, Turns};
 use crate::ids::{Seq, StreamId, TenantId};
 use crate::limits::NOTIFICATIONS_WAITING_MAX;
+use crate::store::Durable;
 
 /// What became durable, for whoever publishes it: places in the log, no content. Noting costs the
 /// writer a lock and no I/O. What finds the queue full is counted and left out; nobody waits.

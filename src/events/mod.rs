@@ -2,7 +2,6 @@
 
 mod codec;
 mod event;
-mod receipt;
 mod record;
 mod tenant;
 mod upcast;
@@ -13,7 +12,6 @@ pub use event::{
     EventKind, Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed,
     RetrainScheduled, SessionClosed, SessionOpened,
 };
-pub use receipt::Durable;
 pub use record::{Batch, Head, Header, HeaderError, Record, Times, commitment};
 pub use tenant::{
     KeyAdmitted, KeyRetired, Overlap, PersonErased, Quotas, QuotasSet, Role, SegmentClosed,

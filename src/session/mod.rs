@@ -21,10 +21,11 @@ pub use reply::{ActionView, KnownExemplar, Phase, Reply, Status, Teachable, Told
 pub use state::{LiveLesson, State};
 
 use self::decide::Refusal;
-use crate::events::{Batch, Durable, Head, Record};
+use crate::events::{Batch, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::invariants::Invariant;
 use crate::learning::{Lesson, Mind, Recipe};
+use crate::store::Durable;
 use crate::world::Domain;
 
 /// One person's session: a state that only records change, and the mind that answers.

@@ -1,10 +1,10 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, RwLock};
 
-use crate::events::{Batch, Durable, Head, Header, Record};
+use crate::events::{Batch, Head, Header, Record};
 use crate::ids::{Seq, StreamId, StreamKey, TenantId, WithinTenant};
 use crate::store::checks;
-use crate::store::log::{AppendError, EventLog, Pending, ReadError, SealedRecords};
+use crate::store::log::{AppendError, Durable, EventLog, Pending, ReadError, SealedRecords};
 use crate::store::sealing::keys::Keys;
 use crate::store::sealing::seal::{Draft, Walk, before};
 

@@ -32,7 +32,9 @@ pub use self::exchange::import::{ImportError, Imported, import};
 pub use self::exchange::rescue::{Loss, RescueError, StreamFound};
 pub use self::exchange::salvage::{SalvageError, Salvaged, Share, salvage};
 pub use self::faults::faulty::{Fault, FaultPlan, FaultyLog};
-pub use self::log::{AppendError, EventLog, Pending, ReadError, SealedRecord, SealedRecords};
+pub use self::log::{
+    AppendError, Durable, EventLog, Pending, ReadError, SealedRecord, SealedRecords,
+};
 pub use self::memory::MemoryLog;
 pub use self::sealing::entropy::{Entropy, OsEntropy, SeededEntropy};
 pub use self::sealing::keys::{KeyError, Keys};

@@ -2,11 +2,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::actors::response::{PersonAsk, Response};
-use crate::events::{Batch, Durable, Head, Record};
+use crate::events::{Batch, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::session::Session;
-use crate::store::AppendError;
+use crate::store::{AppendError, Durable};
 use crate::world::Domain;
 
 /// What happened to a person's seat.

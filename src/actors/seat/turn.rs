@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::{Effect, Seat, Stage};
 use crate::actors::defect::defect;
 use crate::actors::response::{ErrorCode, Response, Waited};
-use crate::events::{Durable, Record, Report};
+use crate::events::{Record, Report};
 use crate::ids::{Digest, RequestId, Timestamp};
 use crate::learning::{self, Mind};
 use crate::sabotage;
 use crate::session::{Command, Divergence, Phase, Proposed, Reply, Session, Told, Turn};
-use crate::store::AppendError;
+use crate::store::{AppendError, Durable};
 use crate::world::Domain;
 
 /// A command to carry out.

@@ -3,10 +3,12 @@
 mod error;
 pub(in crate::store) mod heads;
 mod pending;
+mod receipt;
 
 pub use self::error::{AppendError, ReadError};
 pub use self::pending::Pending;
 pub(in crate::store) use self::pending::Promise;
+pub use self::receipt::Durable;
 
 use crate::events::{Batch, Head, Header, Record};
 use crate::ids::{Digest, Seq, StreamId, TenantId};

@@ -5,7 +5,7 @@ use std::task::{Context, Poll};
 use tokio::sync::oneshot;
 
 use super::error::AppendError;
-use crate::events::Durable;
+use super::receipt::Durable;
 
 /// The end of a promise that keeps it.
 pub(in crate::store) type Promise = oneshot::Sender<Result<Durable, AppendError>>;

@@ -6,14 +6,14 @@ use std::sync::mpsc::Receiver;
 use super::Shared;
 use super::quiet::guarded;
 use super::read::{chunk_key, chunks};
-use crate::events::{Durable, Head};
+use crate::events::Head;
 use crate::fairness::Turns;
 use crate::ids::{StreamId, TenantId};
 use crate::limits::{COMMIT_GROUP_BYTES_MAX, COMMIT_GROUP_MAX};
 use crate::sabotage;
 use crate::store::checks;
 use crate::store::log::heads::HeadsFile;
-use crate::store::log::{AppendError, Promise};
+use crate::store::log::{AppendError, Durable, Promise};
 use crate::store::sealing::seal::Draft;
 
 type Answer = Result<Durable, AppendError>;

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use crate::events::{
-    Batch, Durable, Event, Head, Header, Record, RetrainFailed, SessionClosed, commitment, encode,
+    Batch, Event, Head, Header, Record, RetrainFailed, SessionClosed, commitment, encode,
 };
 use crate::ids::{Digest, RequestId, Seq, StreamId, StreamKey, TenantId, Timestamp, UserId};
 use crate::limits::{BATCH_EVENTS_MAX, KEY_FILE_BYTES, RECORD_BYTES_MAX, STORE_VALUE_BYTES_MAX};
 use crate::store::caches::cache::MemoryCache;
 use crate::store::directory::store::Store;
-use crate::store::log::{AppendError, EventLog, ReadError, SealedRecord};
+use crate::store::log::{AppendError, Durable, EventLog, ReadError, SealedRecord};
 use crate::store::sealing::entropy::OsEntropy;
 use crate::store::sealing::keys::Keys;
 

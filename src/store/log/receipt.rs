@@ -1,7 +1,7 @@
-use super::{Head, Record};
+use crate::events::{Head, Record};
 
-/// The receipt for an append: these records are durable. A reply cannot be made without one
-/// (invariant `DurableBeforeReply`).
+/// The receipt for an append: these records are durable. A reply cannot be made without one, and
+/// only the store can make one: the compiler keeps both (invariant `DurableBeforeReply`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Durable {
     records: Vec<Record>,
@@ -9,9 +9,8 @@ pub struct Durable {
 }
 
 impl Durable {
-    /// For `store/` only, after the records were made durable; `tests/tidy.rs` checks that nothing
-    /// else calls it.
-    pub(crate) fn mint(records: Vec<Record>, head: Head) -> Durable {
+    /// For this room only, after the records were made durable.
+    pub(in crate::store) fn mint(records: Vec<Record>, head: Head) -> Durable {
         Durable { records, head }
     }
 
