@@ -194,7 +194,7 @@ impl<D: Domain> Session<D> {
     }
 
     pub fn head(&self) -> Head {
-        self.state.head.into()
+        self.state.head
     }
 
     pub fn phase(&self) -> Phase {
