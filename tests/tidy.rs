@@ -521,6 +521,60 @@ fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
     assert!(seen >= 6, "{seen} files");
 }
 
+/// The names behind `before` at the beginning of the lines of a file, up to what is no name.
+fn names_in(path: &str, before: &str) -> Vec<String> {
+    let text = read(&root().join(path));
+    let lines = text.lines().filter_map(|line| line.strip_prefix(before));
+    let names = lines.map(|rest| {
+        rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>()
+    });
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn shipped_code_and_a_test_name_each_invariant() {
+    let laws = names_in("crates/core/src/invariants.rs", "    ");
+    let laws: Vec<String> =
+        laws.into_iter().filter(|name| name.starts_with(char::is_uppercase)).collect();
+    assert!(laws.len() >= 10, "{laws:?}");
+    let (mut shipped, mut tests) = (String::new(), String::new());
+    for (folder, _) in SOURCES {
+        let mut files = Vec::new();
+        rust_files(&root().join(folder), &mut files);
+        for path in files.iter().filter(|path| !path.ends_with("core/src/invariants.rs")) {
+            let text = read(path);
+            let product = if is_test(&path.display().to_string()) { "" } else { product(&text) };
+            shipped += &strip(product);
+            tests += &text[product.len()..];
+        }
+    }
+    let mut files = Vec::new();
+    rust_files(&root().join("tests"), &mut files);
+    tests.extend(files.iter().filter(|path| !path.ends_with("tidy.rs")).map(|path| read(path)));
+    for law in laws {
+        assert!(shipped.contains(&format!("Invariant::{law}")), "nothing asserts {law}");
+        let named = [format!("Invariant::{law}"), format!("\"{law}\"")];
+        assert!(named.iter().any(|name| tests.contains(name)), "no test breaks {law}");
+    }
+}
+
+#[test]
+fn every_limit_is_used() {
+    let limits = names_in("crates/core/src/limits.rs", "pub const ");
+    assert!(limits.len() > 50, "{} limits", limits.len());
+    let words: BTreeSet<String> = sources()
+        .iter()
+        .filter(|(file, _)| file != "limits.rs" && !is_test(file))
+        .flat_map(|(_, text)| {
+            let words = product(text).split(|c: char| !c.is_alphanumeric() && c != '_');
+            words.map(str::to_owned).collect::<Vec<_>>()
+        })
+        .collect();
+    for limit in limits {
+        assert!(words.contains(&limit), "nothing enforces {limit}");
+    }
+}
+
 #[test]
 fn nothing_is_left_undone_in_the_code() {
     let unfinished = ["todo!(", "unimplemented!(", "dbg!("];

@@ -8,6 +8,7 @@ use super::{
     Event, EventKind, KeyAdmitted, KeyRetired, PersonErased, QuotasSet, SegmentClosed,
     TenantDisabled, TenantEnabled, TenantOpened, upcast,
 };
+use crate::invariants::Invariant;
 
 /// Why a record's body is no event this binary can read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -16,7 +17,7 @@ pub enum DecodeError {
     UnknownKind { kind: u16 },
     #[error("{kind:?} version {version} is unknown to this version of apprentice; use a newer one")]
     UnknownVersion { kind: EventKind, version: u16 },
-    #[error("the body of a {kind:?} event does not decode: {reason}")]
+    #[error("the body of a {kind:?} event does not decode: {reason} ({})", Invariant::OldLogsOpen)]
     Body { kind: EventKind, reason: String },
 }
 

@@ -11,6 +11,7 @@ use crate::events::{
     RetrainCompleted, SessionOpened,
 };
 use crate::ids::Seq;
+use crate::invariants::Invariant;
 use crate::language::{Outcome, Program};
 use crate::learning::Lesson;
 use crate::world::Domain;
@@ -23,6 +24,16 @@ pub struct Divergence {
     pub field: &'static str,
     pub recorded: String,
     pub recomputed: String,
+}
+
+/// The field of the scene that a program leaves behind.
+const SCENE: &str = "scene digest";
+
+impl Divergence {
+    /// The law that was broken, where it has a name.
+    pub fn law(&self) -> Option<Invariant> {
+        (self.field == SCENE).then_some(Invariant::SceneAgrees)
+    }
 }
 
 /// Applies one record to the state.
@@ -121,7 +132,7 @@ fn start<D: Domain>(
     };
     let scene: D::Scene = event.scene.decode().map_err(|reason| unreadable("scene", reason))?;
     let task: D::Task = event.task.decode().map_err(|reason| unreadable("task", reason))?;
-    agree(seq, "scene digest", event.scene_digest, domain.digest(&scene))?;
+    agree(seq, SCENE, event.scene_digest, domain.digest(&scene))?;
     state.episode = Some(Episode {
         scene: Arc::new(scene),
         task: Arc::new(task),
@@ -192,7 +203,7 @@ fn interpret<D: Domain>(
     if event.answer.mentioned.is_some() {
         episode.mentioned = event.answer.mentioned.clone();
     }
-    agree(seq, "scene digest", event.scene_after, domain.digest(&episode.scene))
+    agree(seq, SCENE, event.scene_after, domain.digest(&episode.scene))
 }
 
 fn end<S, T>(state: &mut State<S, T>, seq: Seq, event: &EpisodeEnded) -> Result<(), Divergence> {

@@ -168,10 +168,15 @@ impl<D: Domain> Session<D> {
 
     /// Work that is due: re-asked after every settle and every activation, so that a scheduled
     /// training is never forgotten (invariant `NoLostWork`).
+    ///
+    /// - panics: when the state has lost a lesson of it.
     pub fn outstanding(&self) -> Option<Outstanding<D>> {
         let training = self.state.training.as_ref()?;
         let recipe = self.recipe.clone()?;
-        Some(Outstanding::Retrain { recipe, lessons: self.lessons_of(&training.lessons) })
+        let lessons = self.lessons_of(&training.lessons);
+        let (law, due) = (Invariant::NoLostWork, training.lessons.len());
+        assert_eq!(lessons.len(), due, "{law}: a scheduled training has all its lessons");
+        Some(Outstanding::Retrain { recipe, lessons })
     }
 
     /// The lessons that the present mind was trained on, for whoever must train it again.

@@ -43,8 +43,8 @@ pub enum Effect<D: Domain, C> {
     Append { after: Head, batch: Batch },
     /// Answer a caller. Each caller is answered once.
     Answer { caller: C, response: Response },
-    /// Read records of the person's stream; the end is [`Input::ReadBack`].
-    ReadBack { first: Seq, last: Seq },
+    /// Read the records of a request from the person's stream; the end is [`Input::ReadBack`].
+    ReadBack { request: RequestId, first: Seq, last: Seq },
     /// Keep a mind in memory, where [`Effect::FindMind`] looks.
     Remember(Arc<Mind>),
     /// Find a mind; the end is [`Input::Found`].

@@ -66,7 +66,7 @@ impl<D: Domain, C> Seat<D, C> {
             Ok(Ok(Proposed::Turn(_))) if is_new => self.open(work, fresh),
             Ok(Ok(Proposed::Turn(turn))) => self.append(turn, Doing::Appending(work)),
             Ok(Ok(Proposed::Repeat { first, last })) => {
-                self.effects.push(Effect::ReadBack { first, last });
+                self.effects.push(Effect::ReadBack { request: work.request, first, last });
                 self.doing = Some(Doing::ReadingBack(work));
             }
             Ok(Ok(Proposed::Defect(divergence))) => {
@@ -294,7 +294,8 @@ impl<D: Domain, C> Seat<D, C> {
 
     /// The records are other ones than the state expects: the seat reads them from the log.
     fn disagrees(&mut self, caller: Option<C>, divergence: &Divergence) {
-        tracing::error!(stream = %self.stream, %divergence, "binary and log disagree");
+        let law = divergence.law().map(tracing::field::display);
+        tracing::error!(stream = %self.stream, law, %divergence, "binary and log disagree");
         self.answer(caller, Response::error(ErrorCode::Internal, divergence.to_string()));
         self.leave();
     }

@@ -1,5 +1,6 @@
 use crate::events::{DecodeError, HeaderError};
 use crate::ids::StreamId;
+use crate::invariants::Invariant;
 
 /// Milliseconds after which a request may be sent again that met another writer, or a full log.
 const RETRY_APPEND_MS: u32 = 100;
@@ -59,9 +60,15 @@ impl AppendError {
 pub enum ReadError {
     #[error("record {seq}: {error}")]
     Header { seq: u64, error: HeaderError },
-    #[error("record {seq}: its predecessor is {expected}, but it names {found}")]
+    #[error(
+        "record {seq}: its predecessor is {expected}, but it names {found} ({})",
+        Invariant::Chained
+    )]
     Chain { seq: u64, expected: String, found: String },
-    #[error("expected record {expected}, found {found}: records are missing")]
+    #[error(
+        "expected record {expected}, found {found}: records are missing ({})",
+        Invariant::DenseSeq
+    )]
     Gap { expected: u64, found: u64 },
     #[error("record {seq}: its chunks are incomplete: {reason}")]
     Chunks { seq: u64, reason: String },

@@ -273,6 +273,7 @@ pub(in crate::store) fn before(from: Seq) -> Option<Seq> {
 mod tests {
     use super::*;
     use crate::events::SessionClosed;
+    use crate::invariants::Invariant;
     use crate::store::sealing::entropy::SeededEntropy;
 
     fn sealed() -> (DataKey, Sealed) {
@@ -322,7 +323,11 @@ mod tests {
         let repeated = walk.clone().step(&sealed.frames[0]).unwrap_err();
         assert_eq!(repeated, ReadError::Gap { expected: 2, found: 1 });
         let mut elsewhere = Walk::after(StreamKey([7; 16]), Head { seq: 1, digest: Digest::ZERO });
-        assert!(matches!(elsewhere.step(&sealed.frames[1]), Err(ReadError::Chain { .. })));
+        let unchained = elsewhere.step(&sealed.frames[1]).unwrap_err();
+        assert!(matches!(unchained, ReadError::Chain { .. }));
+        for (error, law) in [(skipped, Invariant::DenseSeq), (unchained, Invariant::Chained)] {
+            assert!(error.to_string().contains(&law.to_string()), "{error}");
+        }
     }
 
     #[test]
