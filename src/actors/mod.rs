@@ -22,7 +22,8 @@ mod trainer;
 mod user;
 
 pub use archive::{
-    ArchiveAsk, Frame, HeadView, Heads, PlainRecords, PlainView, Reader, SealedRecords, SealedView,
+    ArchiveAsk, ArchiveReader, Frame, HeadView, Heads, PlainRecords, PlainView, SealedRecords,
+    SealedView,
 };
 pub use clock::wall_clock;
 pub use directory::{

@@ -24,7 +24,7 @@ use super::unsent::Unsent;
 use super::zap::{Gate, Seal};
 use super::{Context, CurveKey, Endpoint, GatewayError, lock, rights, wire};
 use crate::actors::{
-    CommitNotification, CommitNotifications, Failure, FeedView, Front, PlainView, Reader,
+    ArchiveReader, CommitNotification, CommitNotifications, Failure, FeedView, Front, PlainView,
     SealedView,
 };
 use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId};
@@ -76,7 +76,7 @@ pub struct FeedDoor<'a> {
     /// Messages that wait for one subscriber; see [`crate::limits::FEED_WAITING_MAX`].
     pub waiting_max: i32,
     pub notifications: CommitNotifications,
-    pub reader: Reader,
+    pub reader: ArchiveReader,
 }
 
 /// What the feed holds its subscribers against.
@@ -214,7 +214,7 @@ struct Press {
     /// Messages that have not left the process.
     unsent: Unsent,
     notifications: CommitNotifications,
-    reader: Reader,
+    reader: ArchiveReader,
     failure: Failure,
     views: Views,
     stands: BTreeMap<TenantId, Stand>,

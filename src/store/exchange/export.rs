@@ -106,7 +106,8 @@ pub fn export(dir: &Path, tenant: &TenantId, path: &Path) -> Result<Exported, Ex
     }
     let fresh = beside(path);
     let file = create(&fresh).map_err(|error| failed(&fresh, &error))?;
-    let mut out = Writer { out: BufWriter::new(file), hasher: blake3::Hasher::new(), frames: 0 };
+    let mut out =
+        ExportWriter { out: BufWriter::new(file), hasher: blake3::Hasher::new(), frames: 0 };
     let mut exported = Exported { people: 0, records: 0 };
     let written = (|| {
         out.frame(TENANT, &[tenant.as_str().as_bytes()]).map_err(|e| failed(path, &e))?;
@@ -149,13 +150,13 @@ fn directory_of(path: &Path) -> &Path {
     path.parent().filter(|up| !up.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-struct Writer {
+struct ExportWriter {
     out: BufWriter<File>,
     hasher: blake3::Hasher,
     frames: u64,
 }
 
-impl Writer {
+impl ExportWriter {
     fn frame(&mut self, kind: u8, parts: &[&[u8]]) -> io::Result<()> {
         let length: usize = parts.iter().map(|part| part.len()).sum();
         let length = u32::try_from(length).expect("a record is below 4 GiB (limits)").to_be_bytes();
@@ -179,7 +180,7 @@ fn checksum(kind: u8, length: [u8; 4], parts: &[&[u8]]) -> u32 {
 }
 
 /// What a frame of an export says.
-pub(in crate::store) enum Frame {
+pub(in crate::store) enum ExportFrame {
     Tenant(TenantId),
     /// The key file's bytes; none for a person who was erased.
     Person {
@@ -195,30 +196,30 @@ pub(in crate::store) enum Frame {
 pub(in crate::store) type BadFrame = (u64, String);
 
 /// Reads an export frame by frame, proving each.
-pub(in crate::store) struct Reader<R> {
+pub(in crate::store) struct ExportReader<R> {
     input: R,
     hasher: blake3::Hasher,
     pub(in crate::store) frames: u64,
 }
 
-impl Reader<BufReader<File>> {
-    pub(in crate::store) fn open(path: &Path) -> io::Result<Reader<BufReader<File>>> {
-        Ok(Reader::of(BufReader::new(File::open(path)?)))
+impl ExportReader<BufReader<File>> {
+    pub(in crate::store) fn open(path: &Path) -> io::Result<ExportReader<BufReader<File>>> {
+        Ok(ExportReader::of(BufReader::new(File::open(path)?)))
     }
 }
 
-impl<R: Read> Reader<R> {
-    pub(in crate::store) fn of(input: R) -> Reader<R> {
-        Reader { input, hasher: blake3::Hasher::new(), frames: 0 }
+impl<R: Read> ExportReader<R> {
+    pub(in crate::store) fn of(input: R) -> ExportReader<R> {
+        ExportReader { input, hasher: blake3::Hasher::new(), frames: 0 }
     }
 
-    /// The next frame. After [`Frame::End`] the file must end.
-    pub(in crate::store) fn next(&mut self) -> Result<Frame, BadFrame> {
+    /// The next frame. After [`ExportFrame::End`] the file must end.
+    pub(in crate::store) fn next(&mut self) -> Result<ExportFrame, BadFrame> {
         let number = self.frames + 1;
         self.read().map_err(|reason| (number, reason)).inspect(|_| self.frames = number)
     }
 
-    fn read(&mut self) -> Result<Frame, String> {
+    fn read(&mut self) -> Result<ExportFrame, String> {
         let mut head = [0; HEAD_BYTES];
         self.fill(&mut head)?;
         let kind = head[4];
@@ -253,24 +254,24 @@ impl<R: Read> Reader<R> {
         })
     }
 
-    fn end(&mut self, payload: &[u8]) -> Result<Frame, String> {
+    fn end(&mut self, payload: &[u8]) -> Result<ExportFrame, String> {
         let digest = *self.hasher.finalize().as_bytes();
         if payload != [&self.frames.to_be_bytes()[..], &digest].concat() {
             return Err("the frames before it were changed".to_owned());
         }
         match self.input.read(&mut [0]) {
-            Ok(0) => Ok(Frame::End),
+            Ok(0) => Ok(ExportFrame::End),
             Ok(_) => Err("there are bytes after the end".to_owned()),
             Err(error) => Err(error.to_string()),
         }
     }
 }
 
-fn frame_of(kind: u8, payload: Vec<u8>) -> Option<Frame> {
+fn frame_of(kind: u8, payload: Vec<u8>) -> Option<ExportFrame> {
     match kind {
         TENANT => {
             let name = std::str::from_utf8(&payload).ok()?;
-            Some(Frame::Tenant(TenantId::new(name).ok()?))
+            Some(ExportFrame::Tenant(TenantId::new(name).ok()?))
         }
         PERSON => {
             let (key, rest) = payload.split_first_chunk()?;
@@ -278,9 +279,9 @@ fn frame_of(kind: u8, payload: Vec<u8>) -> Option<Frame> {
             let (digest, wrapped) = rest.split_first_chunk()?;
             let head = Head { seq: u64::from_be_bytes(*seq), digest: Digest(*digest) };
             let wrapped = (!wrapped.is_empty()).then(|| wrapped.to_vec());
-            Some(Frame::Person { key: StreamKey(*key), head, wrapped })
+            Some(ExportFrame::Person { key: StreamKey(*key), head, wrapped })
         }
-        RECORD => Some(Frame::Record(payload)),
+        RECORD => Some(ExportFrame::Record(payload)),
         _ => None,
     }
 }

@@ -3,7 +3,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::export::{BadFrame, Exported, Frame, Reader};
+use super::export::{BadFrame, ExportFrame, ExportReader, Exported};
 use crate::events::Head;
 use crate::ids::{StreamId, TenantId};
 use crate::store::directory::error::OpenError;
@@ -82,7 +82,7 @@ pub fn import(dir: &Path, path: &Path, key_file: &Path) -> Result<Imported, Impo
 
 /// Reads the whole file and proves each record and each key.
 fn prove(path: &Path, secret: &[u8], key_file: &Path) -> Result<Imported, ImportError> {
-    let mut reader = Reader::open(path).map_err(|error| ImportError::Io {
+    let mut reader = ExportReader::open(path).map_err(|error| ImportError::Io {
         path: path.display().to_string(),
         reason: error.to_string(),
     })?;
@@ -95,7 +95,7 @@ fn prove(path: &Path, secret: &[u8], key_file: &Path) -> Result<Imported, Import
         path: key_file.display().to_string(),
         reason: error.to_string(),
     };
-    let Frame::Tenant(tenant) = reader.next().map_err(damaged)? else {
+    let ExportFrame::Tenant(tenant) = reader.next().map_err(damaged)? else {
         return Err(damaged((1, "it does not name a tenant".to_owned())));
     };
     let keys = Keys::of_secret(&tenant, secret, key_file, Arc::new(OsEntropy)).map_err(bad_key)?;
@@ -104,15 +104,18 @@ fn prove(path: &Path, secret: &[u8], key_file: &Path) -> Result<Imported, Import
     loop {
         let frame = reader.next().map_err(damaged)?;
         let number = reader.frames;
-        if let (Frame::Person { .. } | Frame::End, Some((walk, head))) = (&frame, &person)
+        if let (ExportFrame::Person { .. } | ExportFrame::End, Some((walk, head))) =
+            (&frame, &person)
             && walk.last() != *head
         {
             let reason = format!("before it stand {} of {} records", walk.last().seq, head.seq);
             return Err(damaged((number, reason)));
         }
         match frame {
-            Frame::Tenant(_) => return Err(damaged((number, "it names a second tenant".into()))),
-            Frame::Person { key, head, wrapped } => {
+            ExportFrame::Tenant(_) => {
+                return Err(damaged((number, "it names a second tenant".into())));
+            }
+            ExportFrame::Person { key, head, wrapped } => {
                 let stream = StreamId { tenant: tenant.clone(), key };
                 if let Some(wrapped) = wrapped {
                     keys.unwrap(&stream, &wrapped, key_file).map_err(bad_key)?;
@@ -120,14 +123,14 @@ fn prove(path: &Path, secret: &[u8], key_file: &Path) -> Result<Imported, Import
                 counts.people += u64::from(!stream.is_tenants());
                 person = Some((Walk::after(key, Head::EMPTY), head));
             }
-            Frame::Record(bytes) => {
+            ExportFrame::Record(bytes) => {
                 let Some((walk, _)) = &mut person else {
                     return Err(damaged((number, "it is a record of nobody".to_owned())));
                 };
                 walk.step(&bytes).map_err(|error| damaged((number, error.to_string())))?;
                 counts.records += 1;
             }
-            Frame::End => return Ok(Imported { tenant, counts }),
+            ExportFrame::End => return Ok(Imported { tenant, counts }),
         }
     }
 }
@@ -142,12 +145,12 @@ fn put_all(
     let text = |error: io::Error| error.to_string();
     let users = users_of(dir, tenant);
     make_dir(&users).map_err(text)?;
-    let mut reader = Reader::open(path).map_err(text)?;
+    let mut reader = ExportReader::open(path).map_err(text)?;
     let mut person: Option<(StreamId, Walk)> = None;
     loop {
         match reader.next().map_err(|(frame, reason)| format!("frame {frame}: {reason}"))? {
-            Frame::Tenant(_) => {}
-            Frame::Person { key, wrapped, .. } => {
+            ExportFrame::Tenant(_) => {}
+            ExportFrame::Person { key, wrapped, .. } => {
                 let stream = StreamId { tenant: tenant.clone(), key };
                 let file = dir.join("keys").join(user_file(&stream));
                 match wrapped {
@@ -157,12 +160,12 @@ fn put_all(
                 .map_err(text)?;
                 person = Some((stream, Walk::after(key, Head::EMPTY)));
             }
-            Frame::Record(bytes) => {
+            ExportFrame::Record(bytes) => {
                 let (stream, walk) = person.as_mut().ok_or("the file changed while it was read")?;
                 walk.step(&bytes).map_err(|error| error.to_string())?;
                 adopter.put(stream, walk.last(), &bytes)?;
             }
-            Frame::End => return sync_dir(&users).map_err(text),
+            ExportFrame::End => return sync_dir(&users).map_err(text),
         }
     }
 }

@@ -62,7 +62,7 @@ pub(in crate::store) fn tenant_of_tree(name: &[u8]) -> Option<TenantId> {
 /// *Durable* means: batch applied, `flush`, `fdatasync` of sled's file (its flush alone does not
 /// reach the disk), the new heads written to a file of our own, `fdatasync` of that. Only then are
 /// promises kept and do readers see the records. After the first I/O error the log is poisoned: it
-/// acknowledges nothing until it is opened anew.
+/// acknowledges nothing until it is opened again.
 pub struct SledLog {
     shared: Arc<Shared>,
     sender: Option<SyncSender<Job>>,
@@ -83,8 +83,8 @@ struct Shared {
     /// What is durable. Readers see nothing beyond it.
     heads: RwLock<Heads>,
     poisoned: OnceLock<String>,
-    /// What stands in the committer's queue.
-    waiting: Waiting,
+    /// What waits for the committer.
+    waiting: CommitQueue,
     sizes: Sizes,
     in_hand: InHand,
     /// A group was given up; the committer may never come back from it.
@@ -92,9 +92,9 @@ struct Shared {
 }
 
 /// Room for batches that wait for the committer.
-struct Waiting(Mutex<WaitingRooms>);
+struct CommitQueue(Mutex<CommitQueueRooms>);
 
-struct WaitingRooms {
+struct CommitQueueRooms {
     batches: Room,
     bytes: Room,
 }
@@ -161,7 +161,7 @@ impl SledLog {
         let heads_path = dir.join("HEADS");
         let recorded = HeadsFile::read(&heads_path).map_err(LogError::Io)?;
         // Nothing was acknowledged by a directory whose making was interrupted, and its files may
-        // be half written, by a full disk for one: they are made anew. The heads file would know.
+        // be half written, by a full disk for one: they are made again. The heads file would know.
         let nothing_known = |read: &HeadsRead| read.damage.is_none() && read.heads.is_empty();
         let fresh = fresh && recorded.as_ref().is_none_or(nothing_known);
         let recorded = match fresh {
@@ -192,7 +192,7 @@ impl SledLog {
             sizes: Sizes::new(heads.clone()),
             heads: RwLock::new(heads),
             poisoned: OnceLock::new(),
-            waiting: Waiting::new(),
+            waiting: CommitQueue::new(),
             in_hand: InHand::default(),
             hangs: AtomicBool::new(false),
         });
@@ -246,8 +246,8 @@ impl Drop for SledLog {
         let ended = self.ended.get_mut().unwrap_or_else(PoisonError::into_inner);
         while ended.recv_timeout(LOOK_AGAIN) == Err(RecvTimeoutError::Timeout) {
             if self.shared.hangs.load(Ordering::SeqCst) {
-                // Perhaps for ever, with the database. The directory stays locked until the
-                // process has ended.
+                // The committer may never return. The directory stays locked until the process
+                // ends.
                 std::mem::forget(self._lock.take());
                 if let Some(mark) = self.mark.take() {
                     mark.forget();
@@ -342,10 +342,13 @@ impl EventLog for SledLog {
     }
 }
 
-impl Waiting {
-    fn new() -> Waiting {
+impl CommitQueue {
+    fn new() -> CommitQueue {
         let batches = Room::new(COMMIT_QUEUE_MAX);
-        Waiting(Mutex::new(WaitingRooms { batches, bytes: Room::new(COMMIT_QUEUE_BYTES_MAX) }))
+        CommitQueue(Mutex::new(CommitQueueRooms {
+            batches,
+            bytes: Room::new(COMMIT_QUEUE_BYTES_MAX),
+        }))
     }
 
     /// Makes room for one more batch of a tenant.
@@ -371,13 +374,13 @@ impl Waiting {
         rooms.batches.total()
     }
 
-    fn rooms(&self) -> MutexGuard<'_, WaitingRooms> {
+    fn rooms(&self) -> MutexGuard<'_, CommitQueueRooms> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Shared {
-    /// The first reason counts; the log stays poisoned until it is opened anew.
+    /// The first reason counts; the log stays poisoned until it is opened again.
     fn poison(&self, reason: String) {
         tracing::error!(%reason, "the log is poisoned: nothing is acknowledged until you restart the service");
         let _ = self.poisoned.set(reason);
@@ -428,7 +431,7 @@ fn wait_until_let_go(file: &Path) {
 /// Removes what a process that was killed while the database wrote one of its own snapshots left of
 /// it. `sled` 0.34.7 gives a snapshot its final name only when it is whole, and takes the former one
 /// away after that, so that an unfinished one is never needed; but at the next opening it takes it for
-/// the newest and refuses the whole database for ever.
+/// the newest and refuses to open the whole database from then on.
 fn remove_unfinished_snapshots(path: &Path) -> io::Result<()> {
     let entries = match fs::read_dir(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),

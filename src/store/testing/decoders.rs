@@ -12,7 +12,7 @@ use crate::ids::{StreamId, TenantId};
 use crate::store::caches::origin::Origin;
 use crate::store::caches::snapshots;
 use crate::store::directory::layout;
-use crate::store::exchange::export::{Frame, Reader};
+use crate::store::exchange::export::{ExportFrame, ExportReader};
 use crate::store::log::heads;
 use crate::store::sealing::entropy::Entropy;
 use crate::store::sealing::keys::{KeyError, Keys};
@@ -40,8 +40,8 @@ pub fn layout(bytes: &[u8]) -> Option<u32> {
 /// - returns: its frames.
 /// - errors: the number of the bad frame, and a sentence.
 pub fn export(bytes: &[u8]) -> Result<u64, (u64, String)> {
-    let mut reader = Reader::of(bytes);
-    while !matches!(reader.next()?, Frame::End) {}
+    let mut reader = ExportReader::of(bytes);
+    while !matches!(reader.next()?, ExportFrame::End) {}
     Ok(reader.frames)
 }
 

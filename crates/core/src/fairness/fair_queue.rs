@@ -5,19 +5,19 @@ use crate::ids::TenantId;
 /// A queue in which tenants take turns: each tenant's jobs stay in their order, and whoever has
 /// many waits behind their own jobs, not others behind theirs.
 #[derive(Debug)]
-pub struct Turns<J> {
+pub struct FairQueue<J> {
     lanes: BTreeMap<TenantId, VecDeque<J>>,
     /// The tenants that have a lane; the first is next.
     order: VecDeque<TenantId>,
 }
 
-impl<J> Default for Turns<J> {
-    fn default() -> Turns<J> {
-        Turns { lanes: BTreeMap::new(), order: VecDeque::new() }
+impl<J> Default for FairQueue<J> {
+    fn default() -> FairQueue<J> {
+        FairQueue { lanes: BTreeMap::new(), order: VecDeque::new() }
     }
 }
 
-impl<J> Turns<J> {
+impl<J> FairQueue<J> {
     pub fn push(&mut self, tenant: &TenantId, job: J) {
         match self.lanes.get_mut(tenant) {
             Some(lane) => lane.push_back(job),
@@ -61,13 +61,13 @@ mod tests {
 
     #[test]
     fn one_job_waits_for_one_of_each_other_tenant_and_not_for_a_flood() {
-        let mut turns = Turns::default();
-        (0..1_000).for_each(|job| turns.push(&tenant(0), (0, job)));
-        turns.push(&tenant(1), (1, 0));
-        turns.push(&tenant(2), (2, 0));
-        let first: Vec<_> = (0..4).map_while(|_| turns.pop()).collect();
+        let mut queue = FairQueue::default();
+        (0..1_000).for_each(|job| queue.push(&tenant(0), (0, job)));
+        queue.push(&tenant(1), (1, 0));
+        queue.push(&tenant(2), (2, 0));
+        let first: Vec<_> = (0..4).map_while(|_| queue.pop()).collect();
         assert_eq!(first, [(0, 0), (1, 0), (2, 0), (0, 1)]);
-        assert_eq!(turns.len(), 998);
+        assert_eq!(queue.len(), 998);
     }
 
     proptest! {
@@ -75,17 +75,17 @@ mod tests {
         /// between two turns of a tenant that still has jobs nobody else has more than one.
         #[test]
         fn every_order_of_calls_is_fair(calls in prop::collection::vec(0usize..6, 1..200)) {
-            let mut turns = Turns::default();
+            let mut queue = FairQueue::default();
             let (mut pushed, mut taken) = ([0; 3], [0; 3]);
             let mut since = [[0; 3]; 3];
             for call in calls {
                 if call < 3 {
-                    turns.push(&tenant(call), (call, pushed[call]));
+                    queue.push(&tenant(call), (call, pushed[call]));
                     pushed[call] += 1;
                     continue;
                 }
                 let waiting: Vec<usize> = (0..3).filter(|&t| taken[t] < pushed[t]).collect();
-                match turns.pop() {
+                match queue.pop() {
                     None => prop_assert!(waiting.is_empty()),
                     Some((who, job)) => {
                         prop_assert_eq!(job, taken[who]);
@@ -99,7 +99,7 @@ mod tests {
                     }
                 }
             }
-            prop_assert_eq!(turns.len(), pushed.iter().sum::<usize>() - taken.iter().sum::<usize>());
+            prop_assert_eq!(queue.len(), pushed.iter().sum::<usize>() - taken.iter().sum::<usize>());
         }
     }
 }
