@@ -80,7 +80,7 @@ pub(super) fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Resul
     let wrong = |reason: String| DecodeError::Body { kind, reason };
     // Of a slice, not of a reader: that copies every text twice.
     let mut decoder = rmp_serde::Deserializer::from_read_ref(body);
-    // A scene file of nested tables must not overflow the stack of whoever reads it.
+    // A scene file of nested tables must not overflow the stack of its reader.
     decoder.set_max_depth(64);
     let event = T::deserialize(&mut decoder).map_err(|error| wrong(error.to_string()))?;
     // A slice's decoder does not show what is left; at the end there is no next value to read.

@@ -20,7 +20,7 @@ pub enum TenantEvent {
     SegmentClosed(SegmentClosed),
 }
 
-/// What whoever holds a key may do.
+/// What the holder of a key may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -32,7 +32,7 @@ pub enum Role {
     Auditor,
 }
 
-/// What one tenant may take of what all share. None: no more than the machine has for everybody.
+/// What one tenant may take of what all share. None: only the limits of the machine apply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Quotas {
@@ -54,7 +54,7 @@ pub struct Quotas {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TenantOpened {}
 
-/// From now on whoever holds `key` comes in as this tenant.
+/// From now on the holder of `key` is authenticated as this tenant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyAdmitted {
     pub key: PublicKey,
@@ -85,7 +85,7 @@ pub enum Overlap {
     Former { valid_until: Timestamp },
 }
 
-/// Nobody comes in as this tenant any more.
+/// No key is authenticated as this tenant any more.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TenantDisabled {
     pub reason: String,

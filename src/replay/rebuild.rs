@@ -162,7 +162,7 @@ fn equip<D: Domain>(
 
 /// The mind that the state names: from memory, from its kept bytes, or trained again.
 ///
-/// Kept bytes of other code are not taken at their word but trained again. Should this code train
+/// Kept bytes of other code are not trusted: the mind is trained again. Should this code train
 /// them differently they are used after all: they are what the log names. (Counted in
 /// [`Minds::work`].)
 ///

@@ -54,7 +54,7 @@ pub fn apply<D: Domain>(
     Ok(())
 }
 
-/// Applies an event as the record `seq`, which nobody need have recorded yet: all of [`apply`] but
+/// Applies an event as the record `seq`, which need not be recorded yet: all of [`apply`] but
 /// the place in the chain, the time and the request.
 ///
 /// - errors: [`Divergence`]; the state is then not to be used any more.

@@ -179,7 +179,7 @@ impl<D: Domain> Session<D> {
         Some(Outstanding::Retrain { recipe, lessons })
     }
 
-    /// The lessons that the present mind was trained on, for whoever must train it again.
+    /// The lessons that the present mind was trained on, for training it again.
     pub fn trained_lessons(&self) -> Vec<Lesson<D::Scene, D::Task>> {
         self.lessons_of(&self.state.trained)
     }

@@ -26,7 +26,7 @@ impl ModelStore {
     ///
     /// The person must have a record already: the key that seals minds is made with the first.
     ///
-    /// - errors: a sentence for the log file; nobody is hurt.
+    /// - errors: a sentence for the log file; it costs time only.
     pub fn put(
         &self,
         stream: &StreamId,

@@ -29,7 +29,7 @@ impl SnapshotStore {
     /// Keeps `state`, the fold up to and with `head`, in place of any earlier one. Not durable on
     /// return, and need not be.
     ///
-    /// - errors: a sentence for the log file; nobody is hurt.
+    /// - errors: a sentence for the log file; it costs time only.
     pub fn put(
         &self,
         stream: &StreamId,

@@ -1,6 +1,6 @@
 //! Looking at a suspicious directory before it is opened: on a copy, so that nothing is lost by the
 //! looking, and in a child process with limits, because the database answers damage with a panic, an
-//! endless loop or a wish for all memory. Whatever happens there becomes one sentence here.
+//! endless loop or by using all memory. Whatever happens there becomes one sentence here.
 
 use std::fs;
 use std::io::{self, Read, Write};

@@ -1,5 +1,5 @@
 //! The checkpoints that were given out, outside the database: one file for each tenant, appended to
-//! and synced. Whoever keeps a copy elsewhere can tell later whether the log was rolled back or
+//! and synced. A copy kept elsewhere shows later whether the log was rolled back or
 //! rewritten; the service itself compares with the newest here.
 
 use std::collections::BTreeMap;

@@ -12,7 +12,7 @@ use crate::store::disk::lock::LOCK_FILE;
 pub const LAYOUT: u32 = 2;
 
 pub(super) const LAYOUT_FILE: &str = "LAYOUT";
-/// Stands while a directory is being made; nothing was acknowledged yet.
+/// Exists while a directory is being made; nothing was acknowledged yet.
 const CREATING_FILE: &str = "CREATING";
 const LAYOUT_TEXT: &str = "apprentice data directory, layout ";
 

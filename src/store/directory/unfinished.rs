@@ -9,11 +9,11 @@ use crate::ids::TenantId;
 use crate::store::disk::files::{overwrite_and_remove, sync_dir};
 use crate::store::sled::Adopter;
 
-/// Stands, with the tenant's name in it, while a tenant is being put into a directory.
+/// The file that names the tenant while it is being imported.
 pub(in crate::store) const MARK: &str = "IMPORTING";
 
-/// Ends an import that stands half-way in `dir`: one whose heads are written has happened, any other
-/// has not.
+/// Ends an import that was cut short in `dir`. If its heads are written, it is complete; otherwise it
+/// is undone.
 pub(in crate::store) fn settle(dir: &Path) -> Result<(), String> {
     let mark = dir.join(MARK);
     let name = match fs::read_to_string(&mark) {

@@ -124,7 +124,7 @@ impl FaultyLog {
                     self.inner.append(&stream, after, batch).wait()
                 }
             };
-            // Whoever asked may have been dropped by the crash it survived here.
+            // The caller may be gone: this append survived the crash that dropped it.
             let _ = promise.send(answer);
         }
     }

@@ -38,8 +38,8 @@ pub trait EventLog: Send + Sync {
     fn tenants(&self) -> Result<Vec<TenantId>, ReadError>;
 
     /// The records from `from` on, sealed as they are kept, in order, as they stand now. Each is
-    /// checked as it is read in all that needs no key: it works for whoever has none, and for a
-    /// person who was erased. A damaged record is one error, and the last item.
+    /// checked as it is read in all that needs no key: it also works without keys, and for an
+    /// erased person. A damaged record is one error, and the last item.
     fn sealed<'a>(&'a self, stream: &StreamId, from: Seq) -> Result<SealedRecords<'a>, ReadError>;
 
     /// Walks a stream without opening a body: checksums, dense sequence, chain. What is left to
@@ -57,8 +57,7 @@ pub trait EventLog: Send + Sync {
 /// What [`EventLog::sealed`] gives.
 pub type SealedRecords<'a> = Box<dyn Iterator<Item = Result<SealedRecord, ReadError>> + 'a>;
 
-/// A record as it is kept: whoever has it can compute its digest, and nobody without the person's
-/// key can read it.
+/// A record as it is kept. Its digest can be computed from it; its content needs the person's key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SealedRecord {
     pub header: Header,

@@ -204,7 +204,7 @@ impl Keys {
 
     /// Makes the tenant's secret unless there is one. Returns whether it was made.
     ///
-    /// A caller must be sure that the tenant has no records yet: they would be lost for ever
+    /// A caller must be sure that the tenant has no records yet: they would be lost
     /// behind a new key.
     pub fn make_tenant(&self, tenant: &TenantId) -> Result<bool, KeyError> {
         let mut held = self.held();
@@ -268,7 +268,7 @@ impl Keys {
     fn is_erased(&self, held: &Held, stream: &StreamId) -> bool {
         match &self.home {
             Home::Memory => held.erased.contains(stream),
-            // Whoever's key is in hand is not erased: that spares a look at the disk.
+            // A key in memory is not an erased one, so the disk need not be read.
             Home::Directory { .. } if held.users.contains_key(stream) => false,
             Home::Directory { dir, .. } => user_path(dir, stream, "erased").exists(),
         }

@@ -241,7 +241,7 @@ impl Walk {
         Ok((header, sealed))
     }
 
-    /// As [`Walk::step`], for whoever keeps the frame.
+    /// As [`Walk::step`], for a caller that keeps the frame.
     pub(in crate::store) fn sealed(&mut self, frame: Vec<u8>) -> Result<SealedRecord, ReadError> {
         let (header, _) = self.step(&frame)?;
         Ok(SealedRecord { header, digest: self.last.digest, frame })

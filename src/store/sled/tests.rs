@@ -129,7 +129,7 @@ fn a_directory_whose_making_was_cut_short_is_made_anew() {
     let store = open(dir.path()).unwrap();
     fill(&store, &ada(&store), 3);
     drop(store);
-    // It is not made anew when the heads know of records.
+    // It is not made again when the heads know of records.
     fs::write(dir.path().join("CREATING"), "").unwrap();
     let store = open(dir.path()).unwrap();
     assert_eq!(store.log.head(&ada(&store)).unwrap().seq, 3);

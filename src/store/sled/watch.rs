@@ -1,8 +1,8 @@
 //! Notices a commit that does not come to its end.
 //!
 //! When a write of `sled` 0.34.7 fails that it had left to one of its own threads (a full buffer that
-//! still had writers), that thread sets an error and wakes nobody: a flush that waits for the write
-//! waits for ever. Nobody must wait with it.
+//! still had writers), that thread sets an error and wakes nobody. A flush that waits for the write
+//! then never returns. Nothing else may wait for it.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use super::Shared;
 use crate::store::log::{AppendError, Promise};
 
-/// The promises of the group that is being made durable. Whoever takes them out answers them.
+/// The promises of the group that is being made durable. The one that takes them out answers them.
 #[derive(Default)]
 pub(super) struct InHand(Mutex<Option<Group>>);
 

@@ -1,5 +1,5 @@
 //! What every backend of [`EventLog`] must do. One suite; `tests/store/log_conformance.rs` runs it for
-//! each backend we have, and whoever adds one runs it for theirs.
+//! each backend we have, and each new backend must pass it.
 
 use std::sync::Arc;
 

@@ -18,7 +18,7 @@ use crate::store::sealing::seal::Walk;
 pub struct Rescue {
     index: Index,
     heads: Heads,
-    /// What is wrong with the heads file, in a sentence. Then nobody can say where streams ended.
+    /// What is wrong with the heads file, in a sentence. Then it is unknown where streams ended.
     heads_damage: Option<String>,
     keys: Keys,
     /// The keys of streams of which anything was found.
@@ -71,7 +71,7 @@ impl Rescue {
             path: path.display().to_string(),
             reason: error.to_string(),
         };
-        // A lost lock file keeps nobody from rescuing the rest.
+        // A lost lock file does not prevent a rescue.
         let lock = match File::open(dir.join(LOCK_FILE)) {
             Ok(file) => Some(DirLock::of(file).map_err(|error| Fail(dir).lock(error))?),
             Err(_) => None,
@@ -103,7 +103,7 @@ impl Rescue {
     }
 
     /// Every stream that was acknowledged or of which anything may have been found, and the number
-    /// of those whose tenant nobody knows any more.
+    /// of those whose tenant is unknown.
     pub fn streams(&self) -> (Vec<StreamId>, usize) {
         // A stream beyond heads that are whole was never acknowledged, and neither was a key file
         // without records.

@@ -222,7 +222,7 @@ impl Index {
         if accepted.is_empty() { Err(reason) } else { Ok(accepted) }
     }
 
-    /// The record of that number and digest, wherever it stands.
+    /// The record of that number and digest, wherever it is.
     pub(super) fn named(&self, stream: &StreamId, seq: u64, digest: Digest) -> Option<Vec<u8>> {
         let fits = |frame: &Vec<u8>| Digest::of(frame) == digest;
         let mut pages = Pages::ALL.into_iter();
