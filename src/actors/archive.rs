@@ -10,7 +10,7 @@ use crate::client::{
     SealedRecords, SealedView,
 };
 use crate::events::Record;
-use crate::fairness::{Room, Turns};
+use crate::fairness::{FairQueue, Room};
 use crate::ids::{Seq, StreamId, StreamKey, TenantId};
 use crate::limits::{
     ARCHIVE_QUEUE_MAX, HEADS_IN_REPLY_MAX, RECORDS_IN_REPLY_BYTES, RECORDS_IN_REPLY_MAX,
@@ -20,19 +20,19 @@ use crate::store::{EventLog, ReadError};
 
 /// Reads what is durable. Blocks.
 #[derive(Clone)]
-pub struct Reader {
+pub struct ArchiveReader {
     log: Arc<dyn EventLog>,
 }
 
-impl std::fmt::Debug for Reader {
+impl std::fmt::Debug for ArchiveReader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Reader(..)")
+        f.write_str("ArchiveReader(..)")
     }
 }
 
-impl Reader {
-    pub(super) fn new(log: Arc<dyn EventLog>) -> Reader {
-        Reader { log }
+impl ArchiveReader {
+    pub(super) fn new(log: Arc<dyn EventLog>) -> ArchiveReader {
+        ArchiveReader { log }
     }
 
     pub fn heads(
@@ -79,7 +79,7 @@ impl Reader {
         Ok(SealedRecords { records, more: false })
     }
 
-    /// As [`Reader::sealed`], opened.
+    /// As [`ArchiveReader::sealed`], opened.
     pub fn plain(
         &self,
         stream: &StreamId,
@@ -141,21 +141,22 @@ pub(super) struct Question {
 }
 
 struct Questions {
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<QuestionQueue>,
     changed: Condvar,
 }
 
-struct Waiting {
-    turns: Turns<Question>,
+struct QuestionQueue {
+    queue: FairQueue<Question>,
     room: Room,
     closed: bool,
 }
 
 impl Archive {
     /// - `open`: ends when the thread has let go of the log.
-    pub fn start(reader: Reader, open: Awake) -> std::io::Result<Archive> {
+    pub fn start(reader: ArchiveReader, open: Awake) -> std::io::Result<Archive> {
         let room = Room::new(ARCHIVE_QUEUE_MAX);
-        let waiting = Mutex::new(Waiting { turns: Turns::default(), room, closed: false });
+        let waiting =
+            Mutex::new(QuestionQueue { queue: FairQueue::default(), room, closed: false });
         let questions = Arc::new(Questions { waiting, changed: Condvar::new() });
         let serving = questions.clone();
         thread::Builder::new().name("archive".to_owned()).spawn(move || {
@@ -175,7 +176,7 @@ impl Archive {
             return Err(question.answer);
         }
         let tenant = question.tenant.clone();
-        waiting.turns.push(&tenant, question);
+        waiting.queue.push(&tenant, question);
         self.0.changed.notify_one();
         Ok(())
     }
@@ -184,7 +185,7 @@ impl Archive {
     pub fn close(&self) {
         let mut waiting = self.0.waiting();
         waiting.closed = true;
-        let left = std::mem::take(&mut waiting.turns);
+        let left = std::mem::take(&mut waiting.queue);
         drop(waiting);
         self.0.changed.notify_one();
         drop(left);
@@ -198,7 +199,7 @@ impl Questions {
             if waiting.closed {
                 return None;
             }
-            if let Some(question) = waiting.turns.pop() {
+            if let Some(question) = waiting.queue.pop() {
                 waiting.room.give_back(&question.tenant, 1);
                 return Some(question);
             }
@@ -206,7 +207,7 @@ impl Questions {
         }
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn waiting(&self) -> MutexGuard<'_, QuestionQueue> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -20,7 +20,7 @@ mod system;
 mod trainer;
 mod user;
 
-pub use archive::Reader;
+pub use archive::ArchiveReader;
 pub use clock::wall_clock;
 pub use directory::{
     Directory, DirectoryEffect, DirectoryInput, Letter, NotDelivered, Undelivered,

@@ -2,10 +2,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use crate::events::Durable;
-use crate::fairness::{Room, Turns};
+use crate::fairness::{FairQueue, Room};
 use crate::ids::{Seq, StreamId, TenantId};
 use crate::limits::NOTIFICATIONS_WAITING_MAX;
+use crate::store::Durable;
 
 /// What became durable, for whoever publishes it: places in the log, no content. Noting costs the
 /// writer a lock and no I/O. What finds the queue full is counted and left out; nobody waits.
@@ -14,13 +14,13 @@ pub struct CommitNotifications(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<NotificationQueue>,
     /// Nobody listens until this is set; nothing is kept until then.
     wake: OnceLock<Box<dyn Fn() + Send + Sync>>,
 }
 
-struct Waiting {
-    turns: Turns<CommitNotification>,
+struct NotificationQueue {
+    queue: FairQueue<CommitNotification>,
     room: Room,
     /// Records noted for each tenant, the ones left out included.
     numbers: BTreeMap<TenantId, u64>,
@@ -38,10 +38,15 @@ pub struct CommitNotification {
     pub number: u64,
 }
 
-impl Default for Waiting {
-    fn default() -> Waiting {
+impl Default for NotificationQueue {
+    fn default() -> NotificationQueue {
         let room = Room::new(NOTIFICATIONS_WAITING_MAX);
-        Waiting { turns: Turns::default(), room, numbers: BTreeMap::new(), left_out: 0 }
+        NotificationQueue {
+            queue: FairQueue::default(),
+            room,
+            numbers: BTreeMap::new(),
+            left_out: 0,
+        }
     }
 }
 
@@ -68,7 +73,7 @@ impl CommitNotifications {
             let notification = notification(*number + 1);
             *number += records.len() as u64;
             if waiting.room.take(&stream.tenant, 1) {
-                waiting.turns.push(&stream.tenant, notification);
+                waiting.queue.push(&stream.tenant, notification);
             } else {
                 waiting.left_out += records.len() as u64;
             }
@@ -79,7 +84,7 @@ impl CommitNotifications {
     /// The next notification; tenants take turns.
     pub fn next(&self) -> Option<CommitNotification> {
         let mut waiting = self.waiting();
-        let notification = waiting.turns.pop()?;
+        let notification = waiting.queue.pop()?;
         waiting.room.give_back(&notification.stream.tenant, 1);
         Some(notification)
     }
@@ -87,7 +92,7 @@ impl CommitNotifications {
     /// How many records were noted for each tenant; none while some of them are still to be taken.
     pub fn all_taken(&self) -> Option<BTreeMap<TenantId, u64>> {
         let waiting = self.waiting();
-        waiting.turns.is_empty().then(|| waiting.numbers.clone())
+        waiting.queue.is_empty().then(|| waiting.numbers.clone())
     }
 
     /// Records that found the queue full.
@@ -95,7 +100,7 @@ impl CommitNotifications {
         self.waiting().left_out
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn waiting(&self) -> MutexGuard<'_, NotificationQueue> {
         self.0.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use actix::dev::SendError;
 use actix::{Actor, Addr, Arbiter, ArbiterHandle, SyncArbiter, System};
 
-use super::archive::{Archive, Question, Reader};
+use super::archive::{Archive, ArchiveReader, Question};
 use super::awake::AwakeCount;
 use super::defect::panic_words;
 use super::directory::actor::{
@@ -35,7 +35,7 @@ pub struct ActorSystem {
     registrar: Registrar,
     meters: Arc<Meters>,
     notifications: CommitNotifications,
-    reader: Option<Reader>,
+    reader: Option<ArchiveReader>,
     archive: Archive,
     system: System,
     thread: Option<JoinHandle<()>>,
@@ -190,7 +190,7 @@ impl ActorSystem {
         let tenant_registry = TenantRegistry::open_by(store.clone(), clock)?;
         let meters = Arc::new(Meters::new(tenant_registry.admissions().clone(), store.log.clone()));
         let notifications = tenant_registry.notifications().clone();
-        let reader = Reader::new(store.log.clone());
+        let reader = ArchiveReader::new(store.log.clone());
         let base = base_mind(&*domain, &recipe)?;
         let common = Common {
             domain,
@@ -278,7 +278,7 @@ impl ActorSystem {
     }
 
     /// Reads what is durable; none after a stop. To be dropped before one.
-    pub fn reader(&self) -> Option<Reader> {
+    pub fn reader(&self) -> Option<ArchiveReader> {
         self.reader.clone()
     }
 

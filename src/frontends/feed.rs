@@ -21,7 +21,7 @@ use super::raw::Outlet;
 use super::unsent::Unsent;
 use super::zap::{Gate, Seal};
 use super::{GatewayError, lock, rights};
-use crate::actors::{CommitNotification, CommitNotifications, Failure, Front, Reader};
+use crate::actors::{ArchiveReader, CommitNotification, CommitNotifications, Failure, Front};
 use crate::client::{BEAT, Context, CurveKey, Endpoint, FeedMessage, FeedView, wire};
 use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId};
 use crate::limits::{CUT_OFF_S, FEED_UNSENT_BYTES_MAX, FOREIGN_TOPICS_MAX, TOPICS_MAX};
@@ -35,7 +35,7 @@ pub struct FeedDoor<'a> {
     /// Messages that wait for one subscriber; see [`crate::limits::FEED_WAITING_MAX`].
     pub waiting_max: i32,
     pub notifications: CommitNotifications,
-    pub reader: Reader,
+    pub reader: ArchiveReader,
 }
 
 /// What the feed holds its subscribers against.
@@ -173,7 +173,7 @@ struct Press {
     /// Messages that have not left the process.
     unsent: Unsent,
     notifications: CommitNotifications,
-    reader: Reader,
+    reader: ArchiveReader,
     failure: Failure,
     views: Views,
     stands: BTreeMap<TenantId, Stand>,

@@ -2,10 +2,10 @@ use std::collections::BTreeMap;
 
 use super::{Order, Refusal, decide};
 use crate::events::{
-    Batch, Durable, Event, Head, Overlap, PersonErased, Quotas, Record, Role, SegmentClosed,
-    TenantEvent,
+    Batch, Event, Head, Overlap, PersonErased, Quotas, Record, Role, SegmentClosed, TenantEvent,
 };
 use crate::ids::{PublicKey, RequestId, Seq, StreamKey, Timestamp, WithinTenant};
+use crate::store::Durable;
 
 /// A tenant's stream, folded.
 #[derive(Debug, Clone, PartialEq)]

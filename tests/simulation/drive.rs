@@ -231,9 +231,9 @@ impl System {
                 }
                 self.misbehave(process, generation, after)?;
             }
-            Effect::ReadBack { first, last } => {
+            Effect::ReadBack { request, first, last } => {
                 self.counts.one("repeated");
-                let records = read_back(&*self.store.log, &stream, first, last);
+                let records = read_back(&*self.store.log, &stream, request, (first, last));
                 return Ok(Some(Input::ReadBack(records)));
             }
             Effect::FindMind(digest) => {

@@ -19,11 +19,15 @@ mod system;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use apprentice::actors::{Input, Seat};
+use apprentice::client::{PersonAsk, Query};
+use apprentice::ids::{RequestId, StreamId, TenantId, Timestamp, UserId};
 use apprentice_testkit::chance::number;
+use apprentice_testkit::toy::Bells;
 use counts::Counts;
 use defects::{DEFECTS, Defect};
 use oracle::Broken;
-use system::System;
+use system::{System, beginning};
 
 /// Moves of one seed. Every tenth seed has a long run.
 fn moves(seed: u64) -> usize {
@@ -93,4 +97,15 @@ fn a_service_that_breaks_a_law_is_caught_within_five_hundred_seeds() {
         assert!(laws.contains(&caught.law), "{defect:?} was taken for {caught:?}");
         println!("{defect:?}: seed {seed}, {}: {}", caught.law, caught.how);
     }
+}
+
+#[test]
+#[should_panic(expected = "SingleWriter")]
+fn a_seat_takes_no_request_before_its_session_was_read() {
+    let (_, new) = beginning();
+    let stream = StreamId::of_tenant(&TenantId::local());
+    let mut seat: Seat<Bells, ()> = Seat::new(stream, UserId::new("ada").unwrap(), new.clone());
+    let [request, fresh] = [1, 2].map(|byte| RequestId([byte; 16]));
+    let ask = PersonAsk::Query(Query::Status);
+    seat.step(Input::Asked { ask, request, caller: (), at: Timestamp(1), fresh });
 }

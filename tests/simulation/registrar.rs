@@ -8,13 +8,13 @@ use apprentice::actors::{
     DirectoryInput, Done, Moment, OrderError, TenantWork, TenantWriter, WriterEffect, WriterInput,
     fold_tenant, fold_tenants,
 };
-use apprentice::events::{Durable, Event, TenantEvent};
+use apprentice::events::{Event, TenantEvent};
 use apprentice::ids::{PublicKey, StreamId, TenantId, Timestamp};
 use apprentice::invariants::Invariant;
 use apprentice::replay::{
     CheckpointsError, Through, due_segments, keep_checkpoint, sign_statement,
 };
-use apprentice::store::AppendError;
+use apprentice::store::{AppendError, Durable};
 use apprentice::tenancy::Order;
 
 use crate::defects::Defect;

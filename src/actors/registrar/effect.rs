@@ -1,8 +1,8 @@
 use super::OrderError;
-use crate::events::{Batch, Durable, Event, Head, PersonErased, SegmentClosed};
+use crate::events::{Batch, Event, Head, PersonErased, SegmentClosed};
 use crate::ids::{RequestId, Seq, Signature, StreamId, TenantId, Timestamp};
 use crate::replay::{CheckpointsError, Through};
-use crate::store::{AppendError, KeyError, ReadError};
+use crate::store::{AppendError, Durable, KeyError, ReadError};
 use crate::tenancy::{Order, Registry};
 
 /// What is to be done about a tenant.

@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 
 use super::{Done, Moment, OrderError, TenantWork, TenantWriter, WriterEffect, WriterInput};
-use crate::events::{Durable, Event, Head, SegmentClosed};
+use crate::events::{Event, Head, SegmentClosed};
 use crate::ids::{Digest, Seq, StreamId, TenantId};
 use crate::invariants::Invariant;
 use crate::replay::Through;
-use crate::store::AppendError;
+use crate::store::{AppendError, Durable};
 use crate::tenancy::{self, Order, Refusal, Registry};
 
 /// Work that is under way.

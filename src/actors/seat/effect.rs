@@ -2,11 +2,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::client::{PersonAsk, Response};
-use crate::events::{Batch, Durable, Head, Record};
+use crate::events::{Batch, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::session::Session;
-use crate::store::AppendError;
+use crate::store::{AppendError, Durable};
 use crate::world::Domain;
 
 /// What happened to a person's seat.
@@ -43,8 +43,8 @@ pub enum Effect<D: Domain, C> {
     Append { after: Head, batch: Batch },
     /// Answer a caller. Each caller is answered once.
     Answer { caller: C, response: Response },
-    /// Read records of the person's stream; the end is [`Input::ReadBack`].
-    ReadBack { first: Seq, last: Seq },
+    /// Read the records of a request from the person's stream; the end is [`Input::ReadBack`].
+    ReadBack { request: RequestId, first: Seq, last: Seq },
     /// Keep a mind in memory, where [`Effect::FindMind`] looks.
     Remember(Arc<Mind>),
     /// Find a mind; the end is [`Input::Found`].
