@@ -83,7 +83,7 @@ fn object(lexicon: &Lexicon, row: &Row, words: &[String]) -> Option<Kind> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::Domain;
+    use crate::world::Words;
     use crate::world::household::{Household, Room};
 
     #[test]

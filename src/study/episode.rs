@@ -15,7 +15,7 @@ use super::score::{self, Verdict};
 use crate::language::{Answer, Program, Symbol, tokens};
 use crate::learning::{Lesson, Mind, Recipe, train};
 use crate::world::household::{Household, Kind, Scene, Task};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
 /// Other things that the taught sentence is said about.
 const THINGS: usize = 3;

@@ -8,7 +8,7 @@ use super::score::{self, Verdict};
 use crate::grounding::Abstractor;
 use crate::language::{Answer, Evidence, Mention, Outcome, Program, Step, Symbol, Utterance};
 use crate::learning::Recipe;
-use crate::world::Domain;
+use crate::world::Words;
 use crate::world::household::{Household, Kind, Scene};
 
 /// An answer that was not right.

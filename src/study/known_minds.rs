@@ -7,7 +7,7 @@ use crate::ids::Digest;
 use crate::language::{Program, Utterance};
 use crate::learning::{Lesson, Recipe, TrainError, pinned, train};
 use crate::world::household::{Household, Scene, Task};
-use crate::world::{Domain, Stage};
+use crate::world::{Stage, World};
 
 const WASH: &str = "GOTO SinkBasin; PUT Mug SinkBasin; TOGGLE Faucet; TOGGLE Faucet; PICKUP Mug";
 const COOL: &str =

@@ -17,7 +17,7 @@ use super::score::{self, Verdict};
 use crate::grounding::Moment;
 use crate::language::Answer;
 use crate::learning::{Mind, TrainError, train};
-use crate::world::Domain;
+use crate::world::Words;
 use crate::world::household::{Household, Scene, Task};
 
 /// The actions that stand for one primitive.

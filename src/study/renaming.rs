@@ -90,7 +90,7 @@ pub fn replace(program: &Program, from: &Symbol, to: &Symbol) -> Program {
 mod tests {
     use super::*;
     use crate::world::household::Household;
-    use crate::world::{Domain, Edition};
+    use crate::world::{Edition, Words};
 
     fn check(sentence: &str, from: &str, name: &str, expected: Option<&str>) {
         let household = Household::new();

@@ -10,7 +10,7 @@ use super::corpus::Row;
 use crate::language::{Program, Symbol};
 use crate::numerics::Rng;
 use crate::world::household::{Household, MatchingScene, Scene, Task};
-use crate::world::{Domain, Edition, Lexicon};
+use crate::world::{Edition, Lexicon, Words, World};
 
 /// Other things in a scene, where the room has so many.
 pub const OTHERS: usize = 10;
@@ -136,6 +136,7 @@ fn names_by_kind(lexicon: &Lexicon) -> BTreeMap<Symbol, BTreeSet<&str>> {
 mod tests {
     use super::*;
     use crate::study::draw;
+    use crate::world::Show;
     use crate::world::household::{Room, Task};
 
     fn row(room: Room, program: &str) -> Row {

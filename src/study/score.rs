@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::corpus::Row;
 use super::scenes::Staging;
 use crate::language::{Evidence, Outcome, Program, Step, Symbol};
-use crate::world::Domain;
 use crate::world::household::{Household, Scene, Task};
+use crate::world::{Show, World};
 
 /// What became of one sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

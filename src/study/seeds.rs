@@ -10,7 +10,7 @@ use super::scenes::{Clashes, Stages};
 use crate::language::{Exemplar, Symbol, Utterance, Word};
 use crate::numerics::Rng;
 use crate::world::household::{Household, Kind, Room};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
 /// Draws tried for one seed before it is left out: most pairs of things do not go together.
 const TRIES: usize = 2_000;

@@ -24,7 +24,7 @@ use apprentice::store::{self, DataKey, FaultPlan, SeededEntropy, Store, Walk, de
 use apprentice::study::corpus::Corpus;
 use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 
 use crate::support::diary::Diary;
 use crate::support::samples::samples;

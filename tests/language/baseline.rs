@@ -7,8 +7,8 @@ use apprentice::grounding::Moment;
 use apprentice::language::{Answerer, Exemplar, Outcome, Program, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::study::known_minds::stage;
-use apprentice::world::Domain;
 use apprentice::world::household::{Household, Scene, Task};
+use apprentice::world::{Words, World};
 
 fn recipe(name: &str) -> Recipe {
     Recipe::parse(Recipe::builtin(name).unwrap()).unwrap()

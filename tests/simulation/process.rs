@@ -13,7 +13,7 @@ use apprentice::learning::{Lesson, Mind, Recipe};
 use apprentice::replay::Minds;
 use apprentice::session::Session;
 use apprentice::store::Pending;
-use apprentice::world::Domain;
+use apprentice::world::World;
 
 use crate::support::toy::Bells;
 
@@ -92,7 +92,7 @@ pub struct Job {
     pub generation: u64,
     pub stream: StreamId,
     pub recipe: Arc<Recipe>,
-    pub lessons: Vec<Lesson<<Bells as Domain>::Scene, <Bells as Domain>::Task>>,
+    pub lessons: Vec<Lesson<<Bells as World>::Scene, <Bells as World>::Task>>,
     pub attention: Attention,
 }
 

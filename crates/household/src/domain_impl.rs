@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use super::facts::{Kind, Room, facts};
 use super::features::{FEATURE_COUNT, features};
 use super::primitives::{Action, Chosen, act_on};
@@ -9,7 +11,8 @@ use super::{generate, planner, pointing, polarity, scene_file, task_goal, view, 
 use crate::ids::Digest;
 use crate::language::{Mention, Operator, Program, Signature, Step, Symbol};
 use crate::world::{
-    Domain, Edition, Infeasible, Lexicon, Pointing, SeedSet, Stage, StageError, View,
+    Edition, Features, Infeasible, Lexicon, Pointing, SeedSet, Show, Stage, StageError, View,
+    Words, World,
 };
 
 /// The household world: facts, names and seeds, read once from the embedded tables. One is made
@@ -52,7 +55,7 @@ impl Default for Household {
     }
 }
 
-impl Domain for Household {
+impl World for Household {
     type Scene = Scene;
     type Task = Task;
 
@@ -66,18 +69,6 @@ impl Domain for Household {
 
     fn signature(&self) -> &Signature {
         &self.signature
-    }
-
-    fn lexicon(&self, edition: Edition) -> &Lexicon {
-        let [first, second] = &self.lexicons;
-        match edition {
-            Edition::First => first,
-            Edition::Second => second,
-        }
-    }
-
-    fn seeds(&self) -> &SeedSet {
-        &self.seeds
     }
 
     fn stage(&self, request: &Stage) -> Result<(Scene, Task), StageError> {
@@ -94,10 +85,6 @@ impl Domain for Household {
                 Ok((scene, task))
             }
         }
-    }
-
-    fn step(&self, scene: &mut Scene, task: &Task, step: &Step) -> Result<Vec<String>, Infeasible> {
-        self.step_on(scene, task, step, &[])
     }
 
     fn step_on(
@@ -133,6 +120,24 @@ impl Domain for Household {
         planner::plan(scene, task)
     }
 
+    fn digest(&self, scene: &Scene) -> Digest {
+        scene.digest()
+    }
+}
+
+impl Words for Household {
+    fn lexicon(&self, edition: Edition) -> &Lexicon {
+        let [first, second] = &self.lexicons;
+        match edition {
+            Edition::First => first,
+            Edition::Second => second,
+        }
+    }
+
+    fn seeds(&self) -> &SeedSet {
+        &self.seeds
+    }
+
     fn resolve(&self, edition: Edition, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
         let lexicon = self.lexicon(edition);
         // What is in sight comes before what is shut away, as when walking there.
@@ -158,6 +163,10 @@ impl Domain for Household {
         here.into_iter().map(|(_, _, rank)| mention.types[rank].clone()).collect()
     }
 
+    fn present(&self, scene: &Scene) -> BTreeSet<Symbol> {
+        scene.objects.iter().map(|object| object.kind.symbol().clone()).collect()
+    }
+
     fn held(&self, scene: &Scene) -> Option<Symbol> {
         scene.robot.holds.map(|index| scene.object(index).kind.symbol().clone())
     }
@@ -175,14 +184,6 @@ impl Domain for Household {
             ("OPEN" | "CLOSE", _) => kind.openable(),
             _ => true,
         }
-    }
-
-    fn feature_count(&self) -> usize {
-        FEATURE_COUNT
-    }
-
-    fn features(&self, scene: &Scene, program: &Program) -> Vec<f32> {
-        features(scene, program)
     }
 
     fn contradiction(
@@ -214,11 +215,19 @@ impl Domain for Household {
     fn is_instance_word(&self, word: &str) -> bool {
         StateWord::read(word).is_some()
     }
+}
 
-    fn digest(&self, scene: &Scene) -> Digest {
-        scene.digest()
+impl Features for Household {
+    fn feature_count(&self) -> usize {
+        FEATURE_COUNT
     }
 
+    fn features(&self, scene: &Scene, program: &Program) -> Vec<f32> {
+        features(scene, program)
+    }
+}
+
+impl Show for Household {
     fn goal(&self, task: &Task) -> String {
         task.sentence()
     }

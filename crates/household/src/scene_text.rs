@@ -170,7 +170,7 @@ impl Scene {
 mod tests {
     use super::*;
     use crate::Household;
-    use crate::world::{Domain, Stage};
+    use crate::world::{Stage, World};
 
     #[test]
     fn names_counted_once_are_those_counted_one_by_one() {

@@ -6,7 +6,7 @@ use std::error::Error;
 use std::sync::Arc;
 
 use apprentice_core::language::{Outcome, Utterance};
-use apprentice_core::world::{Domain, Stage};
+use apprentice_core::world::{Stage, World};
 use apprentice_household::Household;
 use apprentice_mind::grounding::Moment;
 use apprentice_mind::learning::{Lesson, Recipe, train};

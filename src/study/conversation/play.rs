@@ -12,7 +12,7 @@ use crate::limits::SCENE_FILE_BYTES_MAX;
 use crate::session::OnClash;
 use crate::study::transcript::{Act, Kind, Line, Request, Setting};
 use crate::world::household::{Household, Scene, Task};
-use crate::world::{Domain, Stage, Thing};
+use crate::world::{Show, Stage, Thing, World};
 
 /// The task that gives tasks back to the seed, as in every transcript.
 const DRAWN: &str = "drawn";

@@ -4,7 +4,7 @@ use crate::language::{Program, Step};
 use crate::study::score;
 use crate::study::transcript::Request;
 use crate::world::household::{Household, Scene, Task};
-use crate::world::{Domain, Infeasible};
+use crate::world::{Infeasible, World};
 
 /// Steps that may come before one that was meant, unsaid: going there, opening what is shut.
 const APPROACH_MAX: usize = 3;

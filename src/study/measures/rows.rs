@@ -9,8 +9,8 @@ use crate::language::{Answerer, Outcome, Program, Step, Symbol};
 use crate::learning::Recipe;
 use crate::learning::recipe::ParserKind;
 use crate::study::participant::{Turn, carried_out_as_meant};
-use crate::world::Domain;
 use crate::world::household::{Household, Scene, Task};
+use crate::world::{Words, World};
 
 /// One finished episode in a participant's journal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

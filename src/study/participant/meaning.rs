@@ -1,8 +1,8 @@
 //! What somebody meant, and whether it is what was done.
 
 use crate::language::{Program, Step};
-use crate::world::Domain;
 use crate::world::household::{Household, Scene, Task};
+use crate::world::{Show, Words, World};
 
 /// What a request comes to in the present scene.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,7 +8,7 @@ use super::wording::{Names, Shunned, Words, say_plainly};
 use crate::language::{Program, Step, Symbol, Utterance};
 use crate::study::draw;
 use crate::world::household::{Household, Scene};
-use crate::world::{Domain, Stage, Thing};
+use crate::world::{Show, Stage, Thing};
 
 /// Rounds of putting right what went wrong in one step, before the episode is given up.
 const REPAIRS_MAX: usize = 3;

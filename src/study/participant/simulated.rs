@@ -14,7 +14,7 @@ use crate::numerics::Rng;
 use crate::study::draw;
 use crate::study::transcript::Request;
 use crate::world::household::{Household, Kind};
-use crate::world::{Domain, Stage, Thing};
+use crate::world::{Show, Stage, Thing, World};
 
 /// Plans made in one episode before it is given up.
 const PLANS_MAX: usize = 60;

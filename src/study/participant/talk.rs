@@ -12,7 +12,7 @@ use crate::ids::{Digest, RequestId, Seq};
 use crate::language::{Outcome, Program, Step};
 use crate::session::{Command, OnClash, RejectionCode, Reply, Told};
 use crate::world::household::{Household, Scene, Task};
-use crate::world::{Domain, Stage, StageError};
+use crate::world::{Stage, StageError, World};
 
 /// The longest that a training may take.
 const TRAINING_MAX: Duration = Duration::from_secs(3_600);

@@ -8,7 +8,7 @@ use super::teacher::{Share, Teacher};
 use crate::language::Symbol;
 use crate::numerics::Rng;
 use crate::world::household::{Household, Kind};
-use crate::world::{Domain, Edition, Lexicon};
+use crate::world::{Edition, Lexicon, Words as _};
 
 /// Letters of a word that a slip of the fingers is noticed in.
 const TYPO_LETTERS_MIN: usize = 4;

@@ -10,7 +10,7 @@ use crate::study::parallel::in_order;
 use crate::study::participant::Said;
 use crate::study::scenes::{Clashes, Stages};
 use crate::world::household::{Household, Kind, Room, Scene, Task};
-use crate::world::{Domain, Stage};
+use crate::world::{Stage, World};
 
 /// Tasks drawn for one episode before the form is given up.
 const DRAWS_MAX: usize = 200;

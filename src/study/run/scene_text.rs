@@ -117,7 +117,7 @@ fn numbered(kinds: &[&str], short: bool) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::world::household::Household;
-    use crate::world::{Domain, Stage};
+    use crate::world::{Show, Stage, World};
 
     #[test]
     fn a_scene_is_read_back_as_it_was() {

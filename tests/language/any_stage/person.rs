@@ -12,7 +12,7 @@ use apprentice::session::{
 };
 use apprentice::store::SeededEntropy;
 use apprentice::world::household::{Household, Kind};
-use apprentice::world::{Domain, StageError};
+use apprentice::world::{StageError, World};
 
 use super::scenes::{pick, said, stage};
 use crate::support::chance::below;

@@ -5,14 +5,14 @@ use crate::language::{
     Clause, Grammar, LiftedArg, LiftedProgram, Mention, Program, Roles, Step, Symbol, Word,
     WordLists,
 };
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
 /// Which things fill the slots of an open program, by what the world allows: the first mention, in
 /// the order of the words, of a type that the operator can ever act on.
 ///
 /// A name that could be the argument is never passed over, whether or not it is in the scene:
 /// "take the spatula from the plate" without a spatula is not about the plate.
-pub struct Arguments<'a, D: Domain> {
+pub struct Arguments<'a, D: Words> {
     pub domain: &'a D,
     pub lists: &'a WordLists,
     pub clause: &'a Clause,
@@ -43,7 +43,7 @@ pub struct Filling {
     pub penalty: f32,
 }
 
-impl<D: Domain> Arguments<'_, D> {
+impl<D: Words> Arguments<'_, D> {
     pub fn accounts(&self) -> bool {
         self.accounting.is_some()
     }

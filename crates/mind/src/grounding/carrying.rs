@@ -3,9 +3,9 @@
 use super::arguments::{Arguments, Filling};
 use super::settings::Carrying;
 use crate::language::{Grammar, Program, Step, Symbol};
-use crate::world::Domain;
+use crate::world::Words;
 
-impl<D: Domain> Arguments<'_, D> {
+impl<D: Words> Arguments<'_, D> {
     /// What taking a thing somewhere means: never a walk without it.
     ///
     /// - `operator`: as what the clause is read.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::combine::{Ground, Offer, Partial, Verdict};
 use super::pointing::pointing;
 use crate::language::{Clause, Grammar, Program, Step, Symbol, WordLists};
-use crate::world::{Domain, Lexicon, Pointing};
+use crate::world::{Lexicon, Pointing, Words};
 
 /// Which thing of a type the words of a clause choose.
 #[derive(Debug, Clone, Default)]
@@ -20,7 +20,7 @@ impl Chosen {
     }
 }
 
-impl<D: Domain> Ground<'_, D> {
+impl<D: Words> Ground<'_, D> {
     /// "The lamp on the dresser": of the types that share a name, one that is there comes first.
     pub(super) fn prefer_what_is_there(
         &self,

@@ -11,7 +11,7 @@ use crate::language::{
     Answerer, Clause, LiftedProgram, LiftedUtterance, Program, Symbol, Word, WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
-use crate::world::{Domain, Edition, Pointing};
+use crate::world::{Edition, Pointing, Words};
 
 /// A lifted program that the parser offers for a clause.
 #[derive(Debug, Clone)]
@@ -92,7 +92,7 @@ pub enum Verdict {
 ///
 /// - returns: at most [`COMBINATIONS_MAX`], in the order of the offers, the last clause's varying
 ///   fastest.
-pub fn combine<D: Domain>(
+pub fn combine<D: Words>(
     moment: &Moment<'_, D>,
     context: &Context<'_>,
     clauses: &[Vec<Offer<'_>>],
@@ -128,7 +128,7 @@ pub(super) struct Partial<S> {
     pub lessons: Vec<Program>,
 }
 
-fn extend<D: Domain>(
+fn extend<D: Words>(
     ground: &Ground<'_, D>,
     clauses: &[Vec<Offer<'_>>],
     partial: &Partial<D::Scene>,
@@ -169,12 +169,12 @@ fn extend<D: Domain>(
     }
 }
 
-pub(super) struct Ground<'a, D: Domain> {
+pub(super) struct Ground<'a, D: Words> {
     pub moment: &'a Moment<'a, D>,
     pub context: &'a Context<'a>,
 }
 
-impl<D: Domain> Ground<'_, D> {
+impl<D: Words> Ground<'_, D> {
     /// Grounds one more clause. Once a step is forbidden nothing more is run, but the program is
     /// completed, so that the answer can show all of what was understood.
     ///

@@ -10,7 +10,7 @@ use crate::language::{
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
 use crate::parser::{Parse, Scored, SemanticParser};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Features, Words};
 
 /// All that an interpretation needs beside the moment and the words: the parts of a mind.
 pub struct Interpreter<'a, P> {
@@ -33,7 +33,11 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     /// Abstract, parse (whole, then split), resolve, combine, keep the feasible, rerank (paper,
     /// section 3.1). An exact lifted match decides, subject only to what the world allows; without
     /// a reranker the nearest feasible candidate wins. Nothing is carried out here.
-    pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
+    pub fn interpret<D: Words + Features>(
+        &self,
+        moment: &Moment<'_, D>,
+        utterance: &Utterance,
+    ) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
         let lessons_alone = match &heard.abstracted.mood {
             None => false,
@@ -105,7 +109,7 @@ impl<P: SemanticParser> Interpreter<'_, P> {
 
     /// Every candidate that runs, nearest first, exact or not: what the reranker learns to choose
     /// from.
-    pub fn candidates<D: Domain>(
+    pub fn candidates<D: Words + Features>(
         &self,
         moment: &Moment<'_, D>,
         utterance: &Utterance,
@@ -129,7 +133,12 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         }
     }
 
-    fn hear<D: Domain>(&self, moment: &Moment<'_, D>, said: &Utterance, ways: Ways) -> Heard<'_> {
+    fn hear<D: Words + Features>(
+        &self,
+        moment: &Moment<'_, D>,
+        said: &Utterance,
+        ways: Ways,
+    ) -> Heard<'_> {
         let lexicon = moment.domain.lexicon(self.edition);
         let abstracted = Abstractor::new(lexicon, self.abstraction, self.known).read(said);
         let grammar = self.abstraction.lists.as_ref();
@@ -178,7 +187,7 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     }
 
     /// Grounds each way of reading the utterance; equal programs are kept once, nearest first.
-    fn ground<D: Domain>(
+    fn ground<D: Words + Features>(
         &self,
         moment: &Moment<'_, D>,
         heard: &Heard<'_>,
@@ -392,7 +401,7 @@ impl Heard<'_> {
     }
 
     /// The answer to what asks for nothing: it names the words that say so.
-    fn not_asked<D: Domain>(&self, moment: &Moment<'_, D>) -> Answer {
+    fn not_asked<D: Words + Features>(&self, moment: &Moment<'_, D>) -> Answer {
         let mood = self.abstracted.mood.clone();
         let evidence = Evidence {
             lifted: vec![self.whole.lifted().clone()],
@@ -458,7 +467,7 @@ impl Heard<'_> {
         }
     }
 
-    fn named_last<D: Domain>(&self, moment: &Moment<'_, D>) -> Option<Symbol> {
+    fn named_last<D: Words + Features>(&self, moment: &Moment<'_, D>) -> Option<Symbol> {
         let mentions = &self.whole.readings[0].0.mentions;
         resolve(moment.domain, self.edition, moment.scene, mentions, moment.mentioned).last
     }

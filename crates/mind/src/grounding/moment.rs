@@ -1,9 +1,9 @@
 use crate::language::Symbol;
-use crate::world::Domain;
+use crate::world::World;
 
 /// The moment an utterance is spoken in: all that its meaning may depend on beside its words.
 #[derive(Debug)]
-pub struct Moment<'a, D: Domain> {
+pub struct Moment<'a, D: World> {
     pub domain: &'a D,
     pub scene: &'a D::Scene,
     pub task: &'a D::Task,

@@ -3,12 +3,12 @@
 use super::accounting::TOOLS;
 use super::arguments::Arguments;
 use crate::language::{Grammar, LiftedUtterance, Program, Symbol, Word};
-use crate::world::Domain;
+use crate::world::Words;
 
 /// "As well as the drawer" is as much as "and the drawer".
 const JOINING: [&str; 6] = ["plus", "well", "followed", "along", "together", "including"];
 
-impl<D: Domain> Arguments<'_, D> {
+impl<D: Words> Arguments<'_, D> {
     /// The things that were named as what to act on, and that the program does not use; of a lesson
     /// also the place where something is to be put, what stands in the place of its fixture, and
     /// what it is to be done with.

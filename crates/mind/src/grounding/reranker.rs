@@ -7,7 +7,7 @@ use crate::numerics::{
     Floats, Linear, Mlp, MlpTrace, Rng, cos, exp, fill_normal, normalise, relu, sin,
 };
 use crate::parser::WordTable;
-use crate::world::Domain;
+use crate::world::Features;
 
 /// The sizes of the reranker and how it is trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,7 +50,7 @@ pub struct RerankerWeights {
     pub(super) judge: Mlp,
 }
 
-/// A program with its state features, [`Domain::feature_count`] numbers.
+/// A program with its state features, [`Features::feature_count`] numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Featured {
     pub program: Program,
@@ -113,7 +113,7 @@ impl Reranker {
     /// The 0-based place of the best of `programs`; the first among equals.
     ///
     /// - panics: `programs` is empty.
-    pub fn best<'p, D: Domain>(
+    pub fn best<'p, D: Features>(
         &self,
         moment: &Moment<'_, D>,
         words: &[String],
@@ -184,7 +184,7 @@ impl Reranker {
 }
 
 /// The program with what the world says about it.
-pub fn featured<D: Domain>(moment: &Moment<'_, D>, program: &Program) -> Featured {
+pub fn featured<D: Features>(moment: &Moment<'_, D>, program: &Program) -> Featured {
     let features = moment.domain.features(moment.scene, program);
     Featured { program: program.clone(), features }
 }

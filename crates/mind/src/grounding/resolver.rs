@@ -1,5 +1,5 @@
 use crate::language::{Mention, Symbol};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
 /// What the mentions of a clause may mean.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,7 +15,7 @@ pub struct Referents {
 ///
 /// - `edition`: of the words that the mentions were found with.
 /// - `before`: what was named last before this clause.
-pub fn resolve<D: Domain>(
+pub fn resolve<D: Words>(
     domain: &D,
     edition: Edition,
     scene: &D::Scene,

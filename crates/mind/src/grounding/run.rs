@@ -5,7 +5,7 @@ use super::chosen::Chosen;
 use super::combine::{Ground, Offer, Verdict};
 use crate::language::{Program, Step};
 use crate::limits::PROGRAM_STEPS_MAX;
-use crate::world::Domain;
+use crate::world::Words;
 
 /// Steps taken unasked before one step that needs them.
 const UNASKED_STEPS_MAX: usize = 3;
@@ -25,7 +25,7 @@ impl Done {
     }
 }
 
-impl<D: Domain> Ground<'_, D> {
+impl<D: Words> Ground<'_, D> {
     /// Carries the steps out on the copy of the scene.
     ///
     /// - `after_lesson`: whether a clause before this one was read as a lesson.

@@ -3,7 +3,7 @@ use crate::grounding::{Abstractor, resolve, without_locations};
 use crate::language::{
     Clause, Exemplar, LiftedArg, LiftedProgram, LiftedStep, Program, Roles, Symbol,
 };
-use crate::world::Domain;
+use crate::world::Words;
 
 /// What a lesson becomes for the parser: its utterance and its program, both lifted (paper,
 /// section 3.2).
@@ -12,11 +12,7 @@ use crate::world::Domain;
 /// types, it meant the one that the program acts on. All other arguments stay what they were:
 /// "wash the mug" keeps its `SinkBasin`. With [`super::recipe::Lifting::held`], what was in the
 /// hand when the utterance was said and was not mentioned becomes `<held>`.
-pub fn lift<D: Domain>(
-    domain: &D,
-    recipe: &Recipe,
-    lesson: &Lesson<D::Scene, D::Task>,
-) -> Exemplar {
+pub fn lift<D: Words>(domain: &D, recipe: &Recipe, lesson: &Lesson<D::Scene, D::Task>) -> Exemplar {
     let settings = recipe.settings();
     let known = |word: &str| recipe.words().lookup(word).is_some();
     let abstractor =
@@ -34,7 +30,7 @@ pub fn lift<D: Domain>(
     }
 }
 
-fn lift_clause<D: Domain>(
+fn lift_clause<D: Words>(
     domain: &D,
     recipe: &Recipe,
     lesson: &Lesson<D::Scene, D::Task>,

@@ -4,7 +4,7 @@ use super::{Recipe, Report, TrainError};
 use crate::grounding::{Interpreter, Moment, Reranker};
 use crate::ids::Digest;
 use crate::language::{Answer, Exemplar, Utterance};
-use crate::world::Domain;
+use crate::world::{Features, Words};
 
 /// Parser, reranker and threshold, ready to use. A pure function of the recipe and the lessons.
 #[derive(Debug, Clone)]
@@ -65,7 +65,7 @@ impl Mind {
     ///
     /// - errors: bytes that are no mind, of another version, of another recipe or other seeds, or
     ///   whose parts do not fit together. Never panics, whatever the bytes.
-    pub fn from_bytes<D: Domain>(
+    pub fn from_bytes<D: Words + Features>(
         domain: &D,
         recipe: &Recipe,
         bytes: &[u8],
@@ -101,7 +101,11 @@ impl Mind {
     }
 
     /// What the utterance asks for at this moment; see [`Interpreter::interpret`].
-    pub fn interpret<D: Domain>(&self, moment: Moment<'_, D>, utterance: &Utterance) -> Answer {
+    pub fn interpret<D: Words + Features>(
+        &self,
+        moment: Moment<'_, D>,
+        utterance: &Utterance,
+    ) -> Answer {
         let known = |word: &str| self.recipe.words().lookup(word).is_some();
         self.interpreter(&known).interpret(&moment, utterance)
     }
@@ -112,7 +116,7 @@ impl Mind {
     ///
     /// - `threshold`: in the unit of the parser's distances.
     /// - returns: none when the parser has no threshold.
-    pub fn interpret_within<D: Domain>(
+    pub fn interpret_within<D: Words + Features>(
         &self,
         moment: Moment<'_, D>,
         utterance: &Utterance,

@@ -10,7 +10,7 @@ use crate::parser::{
     GrammarWeights, Parse, SemanticParser, Seq2SeqParser, Seq2SeqSettings, Seq2SeqWeights,
     TrainFault,
 };
-use crate::world::Domain;
+use crate::world::Words;
 
 /// The parser of a mind, of the kind that its recipe names.
 #[derive(Debug, Clone)]
@@ -35,7 +35,7 @@ pub enum ParserWeights {
 
 impl AnyParser {
     /// - `exemplars`: the domain's seeds, then the lessons.
-    pub fn train<D: Domain>(
+    pub fn train<D: Words>(
         recipe: &Recipe,
         domain: &D,
         seed: Digest,
@@ -69,7 +69,7 @@ impl AnyParser {
     }
 
     /// - errors: weights of another kind than the recipe's, or that do not fit.
-    pub fn restore<D: Domain>(
+    pub fn restore<D: Words>(
         recipe: &Recipe,
         domain: &D,
         exemplars: &[Exemplar],
@@ -238,7 +238,7 @@ fn exemplar(recipe: &Recipe) -> Result<&ExemplarSettings, TrainError> {
     settings.ok_or_else(|| TrainError::failed("the recipe has no section [parser.exemplar]"))
 }
 
-fn features<'a, D: Domain>(
+fn features<'a, D: Words>(
     recipe: &'a Recipe,
     domain: &'a D,
 ) -> Result<(&'a FeaturesSettings, Background<'a>), TrainError> {

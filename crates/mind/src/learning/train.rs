@@ -7,7 +7,7 @@ use crate::ids::Digest;
 use crate::language::{Clause, Exemplar, Symbol};
 use crate::limits::LESSONS_MAX;
 use crate::parser::SemanticParser;
-use crate::world::Domain;
+use crate::world::{Features, Words};
 
 /// Trains a mind: seeds and lifted lessons to exemplars, the parser on them, its threshold; then
 /// the whole history is parsed again and the reranker learns from it (paper, section 3.3).
@@ -18,7 +18,7 @@ use crate::world::Domain;
 ///
 /// - errors: too many lessons, a training that diverges, or a seed that no longer gets its own
 ///   program. The previous mind is then the one to keep.
-pub fn train<D: Domain>(
+pub fn train<D: Words + Features>(
     domain: &D,
     recipe: &Recipe,
     lessons: &[Lesson<D::Scene, D::Task>],
@@ -82,7 +82,7 @@ fn clashes(exemplars: &[Exemplar]) -> bool {
 }
 
 /// Everything that programs may consist of.
-fn symbols<D: Domain>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Vec<Symbol> {
+fn symbols<D: Words>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Vec<Symbol> {
     let operators = domain.signature().operators.iter().map(|operator| operator.name.clone());
     let meanings = domain.lexicon(recipe.settings().words.edition).names.values().flatten();
     let kinds = meanings.map(|meaning| meaning.kind.clone());
