@@ -3,7 +3,7 @@
 use crate::machine::{self, run_with};
 
 /// Runs `seeds` seeds of the simulator from `first` on; the first that breaks a law is printed.
-pub fn simulate(seeds: u64, first: u64) -> Result<(), String> {
+pub(crate) fn simulate(seeds: u64, first: u64) -> Result<(), String> {
     run_with(
         &[("APPRENTICE_SEEDS", &seeds.to_string()), ("APPRENTICE_SEED", &first.to_string())],
         "cargo",
@@ -12,21 +12,21 @@ pub fn simulate(seeds: u64, first: u64) -> Result<(), String> {
 }
 
 /// Kills the service so many times; the first acknowledgement that is not found again is printed.
-pub fn crash(kills: u64, seed: Option<u64>) -> Result<(), String> {
+pub(crate) fn crash(kills: u64, seed: Option<u64>) -> Result<(), String> {
     faults("whenever_it_is_killed", "APPRENTICE_KILLS", kills, seed)
 }
 
 /// Copies so many images of a disk in mid-write; the first that broke a promise is printed.
 ///
 /// - errors: this machine cannot do it, too.
-pub fn powerloss(images: u64, seed: Option<u64>) -> Result<(), String> {
+pub(crate) fn powerloss(images: u64, seed: Option<u64>) -> Result<(), String> {
     machine::disk_tools()?;
     faults("after_a_power_cut", "APPRENTICE_IMAGES", images, seed)
 }
 
 /// Throws so many cases at the decoders; the first that makes one panic, or take too much memory, is
 /// printed.
-pub fn fuzz(cases: u64, seed: Option<u64>, target: Option<&str>) -> Result<(), String> {
+pub(crate) fn fuzz(cases: u64, seed: Option<u64>, target: Option<&str>) -> Result<(), String> {
     let (cases, seed) = (cases.to_string(), seed.map(|seed| seed.to_string()));
     let mut environment = vec![("APPRENTICE_CASES", &*cases)];
     environment.extend(seed.as_deref().map(|seed| ("APPRENTICE_SEED", seed)));
@@ -38,7 +38,7 @@ pub fn fuzz(cases: u64, seed: Option<u64>, target: Option<&str>) -> Result<(), S
 
 /// Flips so many bits of a closed directory, one at a time; the first that was neither harmless nor
 /// reported is printed.
-pub fn damage(flips: u64, seed: Option<u64>) -> Result<(), String> {
+pub(crate) fn damage(flips: u64, seed: Option<u64>) -> Result<(), String> {
     let (flips, seed) = (flips.to_string(), seed.map(|seed| seed.to_string()));
     let mut environment = vec![("APPRENTICE_FLIPS", &*flips)];
     environment.extend(seed.as_deref().map(|seed| ("APPRENTICE_SEED", seed)));

@@ -15,8 +15,8 @@ use crate::world::{
     Words, World,
 };
 
-/// The household world: facts, names and seeds, read once from the embedded tables. One is made
-/// per process and shared behind an `Arc`.
+/// The household as a world: facts, names and seeds, read once from the embedded tables. Make one per
+/// process and share it behind an `Arc`.
 #[derive(Debug)]
 pub struct Household {
     signature: Signature,
@@ -26,6 +26,9 @@ pub struct Household {
 }
 
 impl Household {
+    /// Reads the embedded tables.
+    ///
+    /// - panics: when a table is broken; the tests read all of them.
     pub fn new() -> Household {
         let operator = |name: &str, args: usize| Operator {
             name: Symbol::new(name),
@@ -38,8 +41,8 @@ impl Household {
         Household { signature, lexicons: Edition::ALL.map(words::lexicon), seeds: words::seeds() }
     }
 
-    /// The recorded combinations of things for one form of task, in the words of [`Task::read`],
-    /// each once; none for a form that is not recorded.
+    /// The recorded tasks of one form, in the words of [`Task::read`], each once; empty for a form that
+    /// was not recorded.
     pub fn recorded_tasks(&self, form: &str) -> Vec<&'static str> {
         let rooms = Room::ALL.iter().map(|room| facts().room(*room).tasks.get(form));
         let mut tasks: Vec<&str> = rooms.flatten().flatten().map(String::as_str).collect();
@@ -157,8 +160,8 @@ impl Words for Household {
         if here.is_empty() {
             return mention.types.clone();
         }
-        // A meaning that hardly anybody has in mind waits until no other is here, however near it
-        // is. Of equally near kinds the one that people mean more often by the name.
+        // A rare meaning comes after all others, even if it is nearer. Of equally near kinds, the one
+        // that people mean more often by the name comes first.
         here.sort_unstable();
         here.into_iter().map(|(_, _, rank)| mention.types[rank].clone()).collect()
     }

@@ -40,7 +40,7 @@ pub fn outcomes() -> Result<Vec<Outcome>, Box<dyn Error>> {
     said.map(|text| Ok(mind.interpret(moment(), &Utterance::new(text)?).outcome)).collect()
 }
 
-pub fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
     for (text, outcome) in SAID.iter().zip(outcomes()?) {
         println!("{text}: {outcome:?}");
     }

@@ -1,4 +1,5 @@
-//! What people say and what programs are, before any meaning is guessed. Domain-neutral.
+//! What people say, what programs are, and what came of an utterance. Nothing here depends on a
+//! world.
 
 mod answer;
 mod clause;

@@ -48,8 +48,9 @@ pub trait Words: World {
     /// nothing.
     fn is_on(&self, scene: &Self::Scene, step: &Step) -> bool;
 
-    /// Whether a word names a state that no thing of the type has: "the clean mug" where all mugs
-    /// are dirty. False for a word that names no state.
+    /// Whether a word names a state, and all things of the type are in the opposite one: "the clean
+    /// mug" where all mugs are dirty. False for a word that names no state, without such a thing, and
+    /// where nothing is known of one of them.
     fn unlike(&self, scene: &Self::Scene, kind: &Symbol, word: &str) -> bool;
 
     /// The instance of a type that words choose, by the name that [`Thing::name`] shows: the

@@ -6,11 +6,15 @@ use crate::language::{Clause, Grammar, LiftedUtterance, Roles, Symbol, Word, Wor
 
 /// A clause whose words are accounted for.
 pub(super) struct Account<'a> {
+    /// The recipe's lists.
     pub lists: &'a WordLists,
-    /// The domain's.
+    /// The lexicon's.
     pub adjectives: &'a [String],
+    /// Of the world's operators.
     pub roles: &'a Roles,
+    /// What needs no use.
     pub accounting: &'a Accounting,
+    /// The words.
     pub clause: &'a Clause,
 }
 
@@ -38,7 +42,7 @@ impl<'a> Account<'a> {
     /// Only words where the object stands, where the place of a way or a putting stands, and behind
     /// a joining word count. Near what a thing is, may be called as people like: half of the
     /// recorded landmarks have no name here.
-    pub fn of_primitive(&self, operator: &Symbol) -> Vec<String> {
+    pub(super) fn of_primitive(&self, operator: &Symbol) -> Vec<String> {
         let mut left = Vec::new();
         left.extend(match self.roles.goes(operator) {
             true => self.unknown_way(),
@@ -61,7 +65,7 @@ impl<'a> Account<'a> {
 
     /// The words that a lesson passes over: a thing that nobody knows and that the lesson did not
     /// name either.
-    pub fn of_lesson(&self, taught: &LiftedUtterance) -> Vec<String> {
+    pub(super) fn of_lesson(&self, taught: &LiftedUtterance) -> Vec<String> {
         let in_lesson = |word: &&str| {
             taught.words.iter().any(|known| matches!(known, Word::Text(text) if text == word))
         };
@@ -86,7 +90,7 @@ impl<'a> Account<'a> {
     }
 
     /// The words that a clause without a deed passes over: a way to what nobody knows.
-    pub fn of_idle(&self) -> Vec<String> {
+    pub(super) fn of_idle(&self) -> Vec<String> {
         let ways = self.texts().filter(|(_, word)| self.lists.destination.contains(*word));
         let unknown = ways.filter_map(|(at, _)| self.unknown_at(at + 1, false));
         owned(unknown)

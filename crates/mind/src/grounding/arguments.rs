@@ -12,12 +12,16 @@ use crate::world::{Edition, Words};
 ///
 /// A name that could be the argument is never passed over, whether or not it is in the scene:
 /// "take the spatula from the plate" without a spatula is not about the plate.
-pub struct Arguments<'a, D: Words> {
+pub(super) struct Arguments<'a, D: Words> {
+    /// The world.
     pub domain: &'a D,
+    /// The recipe's lists.
     pub lists: &'a WordLists,
+    /// The words.
     pub clause: &'a Clause,
     /// Per mention the types it may mean here, best first.
     pub types: &'a [Vec<Symbol>],
+    /// What is in the hand.
     pub held: Option<Symbol>,
     /// What the robot stands at.
     pub here: Option<Symbol>,
@@ -30,13 +34,13 @@ pub struct Arguments<'a, D: Words> {
     /// What may be passed over, where words are accounted for. There, several things that are named
     /// side by side each get the operator, and a pronoun means what the operator can work on.
     pub accounting: Option<&'a Accounting>,
-    /// Of the domain's words.
+    /// Of the world's words.
     pub edition: Edition,
 }
 
 /// A way to fill an open program.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filling {
+pub(super) struct Filling {
     /// To be tried in order: they differ in types that share a name.
     pub programs: Vec<Program>,
     /// How far the choice is from the obvious one; 0 is obvious.
@@ -44,12 +48,13 @@ pub struct Filling {
 }
 
 impl<D: Words> Arguments<'_, D> {
-    pub fn accounts(&self) -> bool {
+    /// Whether words are accounted for.
+    pub(super) fn accounts(&self) -> bool {
         self.accounting.is_some()
     }
 
     /// - returns: `None` when the words leave a slot open.
-    pub fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
+    pub(super) fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
         let roles = &self.domain.lexicon(self.edition).roles;
         let slot = |arg: &LiftedArg| matches!(arg, LiftedArg::Slot { .. });
         match program.steps.as_slice() {

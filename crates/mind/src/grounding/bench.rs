@@ -17,14 +17,14 @@ use crate::world::{
     Thing, View, Words, World, refuse_other_instances,
 };
 
-pub struct Bench {
+pub(crate) struct Bench {
     signature: Signature,
     lexicon: Lexicon,
     seeds: SeedSet,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Scene {
+pub(crate) struct Scene {
     pub here: BTreeSet<Symbol>,
     pub far: BTreeSet<Symbol>,
     pub held: Option<Symbol>,
@@ -33,7 +33,7 @@ pub struct Scene {
 
 impl Scene {
     /// - `things`: names of types; `*Block` is far away.
-    pub fn with(things: &str) -> Scene {
+    pub(crate) fn with(things: &str) -> Scene {
         let named = |far| {
             let things = things.split(' ').filter(move |thing| thing.starts_with('*') == far);
             things.map(|thing| Symbol::new(thing.trim_start_matches('*'))).collect()
@@ -41,7 +41,7 @@ impl Scene {
         Scene { here: named(false), far: named(true), held: None, on: BTreeSet::new() }
     }
 
-    pub fn holding(mut self, thing: &str) -> Scene {
+    pub(crate) fn holding(mut self, thing: &str) -> Scene {
         self.held = Some(Symbol::new(thing));
         self.here.remove(thing);
         self
@@ -49,7 +49,7 @@ impl Scene {
 }
 
 impl Bench {
-    pub fn new() -> Bench {
+    pub(crate) fn new() -> Bench {
         let names = [
             ("block", "Block Brick"),
             ("red block", "Brick"),
@@ -97,13 +97,13 @@ impl Bench {
 }
 
 impl Bench {
-    pub fn with_seeds(seeds: &[(&str, &str)]) -> Bench {
+    pub(crate) fn with_seeds(seeds: &[(&str, &str)]) -> Bench {
         let seeds = SeedSet { exemplars: exemplars(seeds), ..SeedSet::default() };
         Bench { seeds, ..Bench::new() }
     }
 }
 
-pub fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
+pub(crate) fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
     let exemplar = |(utterance, program): &(&str, &str)| Exemplar {
         utterance: LiftedUtterance::parse(utterance),
         program: program.parse().unwrap(),
@@ -111,7 +111,7 @@ pub fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
     pairs.iter().map(exemplar).collect()
 }
 
-pub fn say(text: &str) -> Utterance {
+pub(crate) fn say(text: &str) -> Utterance {
     Utterance::new(text).unwrap()
 }
 
@@ -304,7 +304,7 @@ fn act(scene: &mut Scene, step: &Step) -> Result<Vec<String>, Infeasible> {
 }
 
 /// Compares lifted utterances by the words they share; no training.
-pub struct Overlap {
+pub(crate) struct Overlap {
     pub exemplars: Vec<Exemplar>,
     pub threshold: f32,
 }

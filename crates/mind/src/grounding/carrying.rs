@@ -11,7 +11,12 @@ impl<D: Words> Arguments<'_, D> {
     /// - `operator`: as what the clause is read.
     /// - `last`: whether nothing more is asked for behind this clause.
     /// - returns: none when the clause is about nothing of the kind.
-    pub fn carry(&self, carrying: &Carrying, operator: &Symbol, last: bool) -> Option<Filling> {
+    pub(super) fn carry(
+        &self,
+        carrying: &Carrying,
+        operator: &Symbol,
+        last: bool,
+    ) -> Option<Filling> {
         let roles = &self.domain.lexicon(self.edition).roles;
         let operators = [&roles.going, &roles.taking, &roles.putting].map(Option::as_ref);
         let [Some(going), Some(taking), Some(putting)] = operators else { return None };

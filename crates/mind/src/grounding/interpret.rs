@@ -14,8 +14,11 @@ use crate::world::{Edition, Features, Words};
 
 /// All that an interpretation needs beside the moment and the words: the parts of a mind.
 pub struct Interpreter<'a, P> {
+    /// How the utterance is lifted.
     pub abstraction: &'a Abstraction,
+    /// How a program is run.
     pub execution: &'a Execution,
+    /// Finds programs for lifted clauses.
     pub parser: &'a P,
     /// Whether a word is in ordinary use, and so no misspelt name.
     pub known: &'a dyn Fn(&str) -> bool,
@@ -23,7 +26,7 @@ pub struct Interpreter<'a, P> {
     pub reranker: Option<&'a Reranker>,
     /// How many of the parser's exemplars, from the first, are seeds.
     pub seeds: u32,
-    /// Of the domain's words.
+    /// Of the world's words.
     pub edition: Edition,
 }
 

@@ -14,7 +14,11 @@ impl<D: Words> Arguments<'_, D> {
     /// what it is to be done with.
     ///
     /// - `lesson`: its words, if the program is a lesson's.
-    pub fn passed_over(&self, program: &Program, lesson: Option<&LiftedUtterance>) -> Vec<String> {
+    pub(super) fn passed_over(
+        &self,
+        program: &Program,
+        lesson: Option<&LiftedUtterance>,
+    ) -> Vec<String> {
         let uses = |kind: &Symbol| program.steps.iter().any(|step| step.args.contains(kind));
         let mut left = Vec::new();
         // Whether the mention before was named as where something is.

@@ -12,8 +12,11 @@ const UNASKED_STEPS_MAX: usize = 3;
 
 /// What was carried out so far, step by step.
 pub(super) struct Done {
+    /// Those that were carried out.
     pub steps: Vec<Step>,
+    /// Per step the names of the things it acted on.
     pub bindings: Vec<Vec<String>>,
+    /// Per step and argument the thing that words chose.
     pub chosen: Vec<Vec<Option<String>>>,
 }
 

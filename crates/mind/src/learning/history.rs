@@ -8,9 +8,9 @@ use crate::numerics::Rng;
 use crate::parser::SemanticParser;
 use crate::world::{Edition, Features, Words, World};
 
-/// The history that the reranker learns from: each lesson parsed again by the new parser at its
-/// own moment, and each seed with things of a lesson's scene in its slots, so that a few lessons do
-/// not make it forget the primitives.
+/// The history that the reranker learns from. Each lesson is parsed again by the new parser at its own
+/// moment. Each seed is added, with things of a lesson's scene in its slots, so that a few lessons do
+/// not make the reranker forget the primitives.
 ///
 /// - `mind`: the mind so far, without a reranker.
 pub(super) fn history<D: Words + Features>(
@@ -22,7 +22,7 @@ pub(super) fn history<D: Words + Features>(
     let taught = lessons.iter().map(|lesson| taught(domain, mind, lesson));
     let mut rng = Rng::from_digest(seed);
     let names = names(domain, mind.recipe.settings().words.edition);
-    // Everybody's lessons come in their order, so the i-th seed always meets the same scene.
+    // Lessons keep their order, so the i-th seed always gets the same scene.
     let seeded = domain.seeds().exemplars.iter().enumerate().filter_map(|(index, exemplar)| {
         let lesson = &lessons[index % lessons.len()];
         seeded(domain, mind, lesson, exemplar, &names, &mut rng)
@@ -42,8 +42,8 @@ fn taught<D: Words + Features>(
     choice(lesson.utterance.tokens(), &moment, programs, &lesson.program)
 }
 
-/// A seed said at the lesson's moment, about things that stand there. Whether it would run is not
-/// asked: the words alone tell a pick-up from an opening.
+/// A seed at the moment of a lesson, about things of that scene. Whether it would run does not matter:
+/// the words alone tell PICKUP from OPEN.
 fn seeded<D: Words + Features>(
     domain: &D,
     mind: &Mind,

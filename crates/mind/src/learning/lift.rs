@@ -19,7 +19,7 @@ pub fn lift<D: Words>(domain: &D, recipe: &Recipe, lesson: &Lesson<D::Scene, D::
         Abstractor::new(domain.lexicon(settings.words.edition), &settings.abstraction, &known);
     let whole = abstractor.read(&lesson.utterance).whole();
     let lifted = lift_clause(domain, recipe, lesson, &whole);
-    // "from the <obj>" goes only when the program does not need it: then the place was no argument.
+    // "from the <obj>" is dropped only if the program does not need it. Then it was not an argument.
     let shorter = settings.abstraction.locations.then(|| without_locations(&whole)).flatten();
     let shorter = shorter.map(|clause| (lift_clause(domain, recipe, lesson, &clause), clause));
     match shorter {
@@ -48,8 +48,8 @@ fn lift_clause<D: Words>(
         .map(|(types, said)| types.iter().chain(&said.types).find(acts_on).or(types.first()))
         .collect();
     let held = domain.held(&lesson.scene).filter(|_| recipe.settings().lifting.held);
-    // "In the sink" says how, not what: another wording need not say it. But where a task ends is
-    // said of each thing anew.
+    // "In the sink" says how, not what, so other wordings may leave it out. But a person names the
+    // place where a task ends every time.
     let lexicon = domain.lexicon(edition);
     let keeps = recipe.settings().abstraction.lists.is_some();
     let goal = goal(&lexicon.roles, &lesson.program);

@@ -8,6 +8,7 @@ mod lesson;
 mod lift;
 mod mind;
 mod parsing;
+/// Recipes: the settings of minds, and their files.
 pub mod recipe;
 #[cfg(test)]
 mod tests;

@@ -9,12 +9,13 @@ use crate::limits::LESSONS_MAX;
 use crate::parser::SemanticParser;
 use crate::world::{Features, Words};
 
-/// Trains a mind: seeds and lifted lessons to exemplars, the parser on them, its threshold; then
-/// the whole history is parsed again and the reranker learns from it (paper, section 3.3).
+/// Trains a mind. Seeds and lifted lessons become exemplars. The parser is trained on these, with its
+/// threshold. Then the whole history is parsed again, and the reranker learns from it (paper, section
+/// 3.3).
 ///
-/// A pure function: the training seed derives from the recipe's digest alone, so the same recipe
-/// and lessons give the same mind, bit for bit, on every machine. Without lessons it is the base
-/// mind, which everybody starts with.
+/// A pure function: the training seed comes from the recipe's digest alone, so the same recipe and
+/// lessons give the same mind, bit for bit, on every machine. Without lessons it is the base mind, with
+/// which every person starts.
 ///
 /// - errors: too many lessons, a training that diverges, or a seed that no longer gets its own
 ///   program. The previous mind is then the one to keep.
@@ -94,7 +95,9 @@ fn symbols<D: Words>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Vec
     operators.chain(kinds).chain(constants).collect()
 }
 
-/// What everybody can say from the first day must not be lost to a lesson.
+/// Checks that every seed still means its program: no lesson may take it away.
+///
+/// - errors: [`TrainError::SeedUnheard`], [`TrainError::SeedLost`].
 fn seeds_keep_their_programs<S, T>(
     parser: &AnyParser,
     seeds: &[Exemplar],

@@ -5,7 +5,9 @@ use crate::language::Clause;
 /// model answers. Each candidate says which of the two gave it.
 #[derive(Debug, Clone)]
 pub struct BackedParser {
+    /// Asked first.
     pub grammar: GrammarParser,
+    /// Asked where the grammar has no answer.
     pub model: Seq2SeqParser,
 }
 
@@ -19,7 +21,7 @@ impl SemanticParser for BackedParser {
         Parse { threshold: Seq2SeqParser::THRESHOLD, ..parse }
     }
 
-    /// One reading is all that either gives.
+    /// Both give one reading at most.
     fn sure_of_order(&self) -> bool {
         true
     }

@@ -25,7 +25,7 @@ pub(super) struct Batch {
 impl Batch {
     /// `sorts`: the sorts that have a trainable vector, sorted. A sort that has none stands for its
     /// start word.
-    pub fn new(
+    pub(super) fn new(
         settings: &ExemplarSettings,
         words: &WordTable,
         sorts: &[String],
@@ -84,16 +84,16 @@ impl Batch {
         self.sorts.push(sort);
     }
 
-    pub fn rows(&self) -> usize {
+    pub(super) fn rows(&self) -> usize {
         self.ends.len()
     }
 
-    pub fn tokens(&self) -> usize {
+    pub(super) fn tokens(&self) -> usize {
         self.sorts.len()
     }
 
     /// The cells of one utterance.
-    pub fn row(&self, index: usize) -> &[u32] {
+    pub(super) fn row(&self, index: usize) -> &[u32] {
         let start = if index == 0 { 0 } else { self.ends[index - 1] };
         &self.places[start as usize..self.ends[index] as usize]
     }

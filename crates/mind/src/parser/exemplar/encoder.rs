@@ -39,7 +39,7 @@ pub(super) struct Pass {
 }
 
 impl Encoder {
-    pub fn new(
+    pub(super) fn new(
         settings: &ExemplarSettings,
         words: &'static WordTable,
         weights: &ExemplarWeights,
@@ -71,7 +71,7 @@ impl Encoder {
     /// `[rows × embedding]`. What stands in one row does not depend on the others.
     ///
     /// - `parameters`: of the weights that this encoder was made for.
-    pub fn embed(&self, parameters: &[f32], rows: &[Vec<Token>]) -> Vec<f32> {
+    pub(super) fn embed(&self, parameters: &[f32], rows: &[Vec<Token>]) -> Vec<f32> {
         let batch = Batch::new(&self.settings, self.words, &self.sorts, rows);
         let mut longer = Vec::new();
         let positions = if batch.positions <= POSITIONS_KEPT {

@@ -22,7 +22,7 @@ const WIDER: (f32, f32) = (1.001, 1e-4);
 impl ExemplarIndex {
     /// - `points`: `[exemplars × width]`.
     /// - errors: a point is not finite; the search would have no answer.
-    pub fn new(width: usize, points: Vec<f32>) -> Result<ExemplarIndex, TrainFault> {
+    pub(super) fn new(width: usize, points: Vec<f32>) -> Result<ExemplarIndex, TrainFault> {
         if points.iter().any(|x| !x.is_finite()) {
             let reason = "an exemplar's embedding is not finite".to_owned();
             return Err(TrainFault::Weights { reason });
@@ -35,7 +35,7 @@ impl ExemplarIndex {
 
     /// Every exemplar within `range` of the query, and the `nearest` ones whether within it or
     /// not: (exemplar number, distance), nearest first, the older exemplar first among equals.
-    pub fn near(&self, query: &[f32], range: f32, nearest: usize) -> Vec<(u32, f32)> {
+    pub(super) fn near(&self, query: &[f32], range: f32, nearest: usize) -> Vec<(u32, f32)> {
         if query.iter().any(|x| !x.is_finite()) {
             return Vec::new();
         }
@@ -60,7 +60,7 @@ impl ExemplarIndex {
     }
 
     /// Every exemplar with its distance, in order of number.
-    pub fn every(&self, query: &[f32]) -> impl Iterator<Item = (u32, f32)> {
+    pub(super) fn every(&self, query: &[f32]) -> impl Iterator<Item = (u32, f32)> {
         (0..self.points.nrows()).map(move |number| (number as u32, self.distance(query, number)))
     }
 

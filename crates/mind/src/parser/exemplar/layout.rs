@@ -35,37 +35,37 @@ impl Layout {
         start..start + sizes[index]
     }
 
-    pub fn transform(&self) -> Range<usize> {
+    pub(super) fn transform(&self) -> Range<usize> {
         self.part(0)
     }
-    pub fn transform_bias(&self) -> Range<usize> {
+    pub(super) fn transform_bias(&self) -> Range<usize> {
         self.part(1)
     }
-    pub fn first(&self) -> Range<usize> {
+    pub(super) fn first(&self) -> Range<usize> {
         self.part(2)
     }
-    pub fn first_bias(&self) -> Range<usize> {
+    pub(super) fn first_bias(&self) -> Range<usize> {
         self.part(3)
     }
-    pub fn second(&self) -> Range<usize> {
+    pub(super) fn second(&self) -> Range<usize> {
         self.part(4)
     }
-    pub fn second_bias(&self) -> Range<usize> {
+    pub(super) fn second_bias(&self) -> Range<usize> {
         self.part(5)
     }
-    pub fn sorts(&self) -> Range<usize> {
+    pub(super) fn sorts(&self) -> Range<usize> {
         self.part(6)
     }
-    pub fn sort(&self, sort: usize) -> Range<usize> {
+    pub(super) fn sort(&self, sort: usize) -> Range<usize> {
         let start = self.sorts().start + sort * self.dims;
         start..start + self.dims
     }
     /// The places of a and b.
-    pub fn classifier(&self) -> [usize; 2] {
+    pub(super) fn classifier(&self) -> [usize; 2] {
         let start = self.part(7).start;
         [start, start + 1]
     }
-    pub fn total(&self) -> usize {
+    pub(super) fn total(&self) -> usize {
         self.sizes().iter().sum()
     }
 }

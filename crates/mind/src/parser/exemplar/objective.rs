@@ -44,7 +44,7 @@ struct Work {
 
 impl<'a> Objective<'a> {
     /// `classes[i] == classes[j]` says that exemplars i and j have the same program.
-    pub fn new(
+    pub(super) fn new(
         settings: &'a ExemplarSettings,
         layout: Layout,
         batch: &'a Batch,
@@ -73,7 +73,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Overwrites `gradient`; returns the loss in nats, before the step that follows.
-    pub fn evaluate(&mut self, parameters: &[f32], gradient: &mut [f32]) -> f64 {
+    pub(super) fn evaluate(&mut self, parameters: &[f32], gradient: &mut [f32]) -> f64 {
         let Objective { settings, layout, batch, pass, work, .. } = self;
         let encoded = &self.encoded_positions;
         transform_positions(*layout, parameters, encoded, &mut work.positions);

@@ -33,7 +33,7 @@ struct Facts {
 }
 
 impl LessonJudge {
-    pub fn new(knowledge: &Knowledge, roles: &Roles, lessons: &[Exemplar]) -> LessonJudge {
+    pub(super) fn new(knowledge: &Knowledge, roles: &Roles, lessons: &[Exemplar]) -> LessonJudge {
         let mut vocabulary = Vec::new();
         let mut places: BTreeMap<String, usize> = BTreeMap::new();
         let mut place = |word: &str| {
@@ -66,7 +66,7 @@ impl LessonJudge {
     /// Per lesson a probability.
     ///
     /// - `seed_cosine`: the cosine of the utterance to the nearest seed.
-    pub fn judge(
+    pub(super) fn judge(
         &self,
         knowledge: &Knowledge,
         weights: &LessonSettings,

@@ -41,7 +41,7 @@ pub(super) struct Judged {
 }
 
 impl PrimitiveJudge {
-    pub fn new(knowledge: &Knowledge, seeds: &[Exemplar]) -> PrimitiveJudge {
+    pub(super) fn new(knowledge: &Knowledge, seeds: &[Exemplar]) -> PrimitiveJudge {
         let mut operators: Vec<Operator> = Vec::new();
         let mut known = Vec::new();
         for (number, exemplar) in seeds.iter().enumerate() {
@@ -66,12 +66,12 @@ impl PrimitiveJudge {
     }
 
     /// The cosine to the nearest seed.
-    pub fn seed_cosine(&self, sentence: &Sentence) -> f32 {
+    pub(super) fn seed_cosine(&self, sentence: &Sentence) -> f32 {
         self.seeds.iter().map(|seed| dot(&seed.whole, &sentence.whole)).fold(-1.0, f32::max)
     }
 
     /// Every operator, likeliest first (ties: the one that seeds name first).
-    pub fn judge(
+    pub(super) fn judge(
         &self,
         knowledge: &Knowledge,
         weights: &PrimitiveWeights,

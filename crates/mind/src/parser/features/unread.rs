@@ -7,7 +7,7 @@ impl Knowledge {
     /// time to wait.
     ///
     /// A verb counts only where a verb can stand, so "the rinsed mug" and "the wet cloth" do not.
-    pub fn unread(&self, words: &[Word], verb: Option<&Verb>) -> usize {
+    pub(super) fn unread(&self, words: &[Word], verb: Option<&Verb>) -> usize {
         let text = |at: usize| match words.get(at) {
             Some(Word::Text(text)) => Some(text.as_str()),
             _ => None,

@@ -32,7 +32,7 @@ struct Tokens<'u> {
 type End = (usize, Option<u8>);
 
 impl Rules {
-    pub fn compile(settings: &GrammarSettings) -> Result<Rules, (&'static str, String)> {
+    pub(super) fn compile(settings: &GrammarSettings) -> Result<Rules, (&'static str, String)> {
         let names: Vec<&String> = settings.classes.keys().collect();
         let mut classes = Vec::new();
         for (name, phrases) in &settings.classes {
@@ -75,7 +75,7 @@ impl Rules {
     }
 
     /// What the first request that reads the whole utterance means.
-    pub fn read(&self, utterance: &LiftedUtterance) -> Option<LiftedProgram> {
+    pub(super) fn read(&self, utterance: &LiftedUtterance) -> Option<LiftedProgram> {
         let mut mentions = 0;
         let numbered = utterance.words.iter().map(|word| {
             mentions += u8::from(matches!(word, Word::Slot { .. }));

@@ -41,7 +41,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    pub const ALL: [Part; 15] = [
+    pub(super) const ALL: [Part; 15] = [
         Part::ReadWord(0),
         Part::ReadState(0),
         Part::ReadBias(0),
@@ -62,7 +62,7 @@ impl Part {
 
 impl Layout {
     /// Rows and columns; a bias has one row.
-    pub fn shape(&self, part: Part) -> (usize, usize) {
+    pub(super) fn shape(&self, part: Part) -> (usize, usize) {
         let Layout { dims, units, token, writes, tokens } = *self;
         match part {
             Part::ReadWord(_) => (dims, 4 * units),
@@ -77,7 +77,7 @@ impl Layout {
         }
     }
 
-    pub fn at(&self, part: Part) -> Range<usize> {
+    pub(super) fn at(&self, part: Part) -> Range<usize> {
         let size = |part: Part| {
             let (rows, columns) = self.shape(part);
             rows * columns
@@ -87,7 +87,7 @@ impl Layout {
         start..start + size(part)
     }
 
-    pub fn total(&self) -> usize {
+    pub(super) fn total(&self) -> usize {
         self.at(Part::Tokens).end
     }
 }

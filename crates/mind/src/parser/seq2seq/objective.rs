@@ -19,7 +19,7 @@ pub(super) struct Lessons {
 impl Objective {
     /// What the program of each chosen row costs, in nats; `gradient` is overwritten with the
     /// gradient of their mean.
-    pub fn evaluate(
+    pub(super) fn evaluate(
         &mut self,
         layout: Layout,
         parameters: &[f32],

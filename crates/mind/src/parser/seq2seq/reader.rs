@@ -18,7 +18,7 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub fn new<'u>(
+    pub(super) fn new<'u>(
         settings: &Seq2SeqSettings,
         words: &WordTable,
         utterances: impl IntoIterator<Item = &'u LiftedUtterance>,
@@ -70,7 +70,7 @@ pub(super) struct Packing {
 }
 
 impl Packing {
-    pub fn new(lengths: &[usize]) -> Packing {
+    pub(super) fn new(lengths: &[usize]) -> Packing {
         let mut order: Vec<usize> = (0..lengths.len()).collect();
         // Stable: among equal lengths the order is that of the rows.
         order.sort_by_key(|&row| std::cmp::Reverse(lengths[row]));
@@ -113,7 +113,13 @@ pub(super) struct Reader {
 
 impl Reader {
     /// - `chosen`: the rows of `words` that make the batch; none is empty.
-    pub fn forward(&mut self, layout: Layout, parameters: &[f32], words: &Words, chosen: &[usize]) {
+    pub(super) fn forward(
+        &mut self,
+        layout: Layout,
+        parameters: &[f32],
+        words: &Words,
+        chosen: &[usize],
+    ) {
         self.take(layout, words, chosen);
         let units = layout.units;
         self.read.clear();
@@ -223,7 +229,7 @@ impl Reader {
     /// Adds the gradient of the encoder's parameters to `gradient`.
     ///
     /// - `d_read`: the gradient of `read`.
-    pub fn backward(
+    pub(super) fn backward(
         &self,
         layout: Layout,
         parameters: &[f32],
@@ -310,11 +316,11 @@ impl Reader {
 
 impl Reader {
     /// Where a row begins in what was read, and how many words it has.
-    pub fn extent(&self, row: usize) -> (usize, usize) {
+    pub(super) fn extent(&self, row: usize) -> (usize, usize) {
         (self.starts[row], self.rows[row].len())
     }
 
-    pub fn extents(&self) -> Vec<(usize, usize)> {
+    pub(super) fn extents(&self) -> Vec<(usize, usize)> {
         (0..self.rows.len()).map(|row| self.extent(row)).collect()
     }
 }

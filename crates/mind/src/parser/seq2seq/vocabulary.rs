@@ -38,7 +38,7 @@ pub(super) enum Expected {
 
 impl Vocabulary {
     /// - `exemplars`: whose programs name the constants.
-    pub fn new(signature: &Signature, exemplars: &[&Exemplar]) -> Vocabulary {
+    pub(super) fn new(signature: &Signature, exemplars: &[&Exemplar]) -> Vocabulary {
         let operators = signature.operators.iter();
         let operators = operators.map(|o| (o.name.clone(), o.args.clone())).collect();
         let programs = exemplars.iter().map(|exemplar| &exemplar.program);
@@ -50,21 +50,21 @@ impl Vocabulary {
     }
 
     /// How many tokens can be written.
-    pub fn writes(&self) -> usize {
+    pub(super) fn writes(&self) -> usize {
         self.operators.len() + 1 + self.constants.len()
     }
 
     /// How many tokens the decoder can be told.
-    pub fn tokens(&self) -> usize {
+    pub(super) fn tokens(&self) -> usize {
         self.writes() + SLOTS_TOLD
     }
 
-    pub fn end(&self) -> usize {
+    pub(super) fn end(&self) -> usize {
         self.operators.len()
     }
 
     /// The token that the decoder is told after a choice.
-    pub fn told(&self, choice: Choice) -> usize {
+    pub(super) fn told(&self, choice: Choice) -> usize {
         match choice {
             Choice::Write(token) => token,
             Choice::Copy(slot) => self.writes() + slot.min(SLOTS_TOLD - 1),
@@ -75,7 +75,7 @@ impl Vocabulary {
     ///
     /// - returns: `None` for a program that is none of this signature's, or has a slot that the
     ///   utterance has not.
-    pub fn encode(&self, exemplar: &Exemplar) -> Option<Vec<Choice>> {
+    pub(super) fn encode(&self, exemplar: &Exemplar) -> Option<Vec<Choice>> {
         let slots = exemplar.utterance.slots();
         let mut out = Vec::new();
         for step in &exemplar.program.steps {
@@ -104,7 +104,7 @@ impl Vocabulary {
     /// The program that whole choices stand for, the end left out.
     ///
     /// - `sorts`: of the utterance's slots.
-    pub fn decode(&self, choices: &[Choice], sorts: &[Symbol]) -> LiftedProgram {
+    pub(super) fn decode(&self, choices: &[Choice], sorts: &[Symbol]) -> LiftedProgram {
         let mut steps: Vec<LiftedStep> = Vec::new();
         for choice in choices {
             let arg = match *choice {
@@ -126,12 +126,12 @@ impl Vocabulary {
     }
 
     /// What is expected at the beginning, then after each choice.
-    pub fn start(&self) -> Expected {
+    pub(super) fn start(&self) -> Expected {
         Expected::Step { first: true, last: false }
     }
 
     /// - `steps`: operators chosen so far, this choice included.
-    pub fn after(&self, expected: Expected, choice: Choice, steps: usize) -> Expected {
+    pub(super) fn after(&self, expected: Expected, choice: Choice, steps: usize) -> Expected {
         let next = |operator: usize, place: usize| match self.operators[operator].1.len() > place {
             true => Expected::Argument { operator, place },
             false => Expected::Step { first: false, last: steps >= self.steps_max },
@@ -148,7 +148,7 @@ impl Vocabulary {
     /// all be filled, the end behind a step, a constant or a slot of the argument's sort.
     ///
     /// - `sorts`: of the utterance's slots.
-    pub fn allowed(&self, expected: Expected, sorts: &[Symbol]) -> Vec<Choice> {
+    pub(super) fn allowed(&self, expected: Expected, sorts: &[Symbol]) -> Vec<Choice> {
         match expected {
             Expected::Step { first, last } => {
                 let fills = |sort: &Symbol| !self.constants.is_empty() || sorts.contains(sort);

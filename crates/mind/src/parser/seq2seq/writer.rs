@@ -18,7 +18,7 @@ pub(super) struct Target {
 
 impl Target {
     /// - `choices`: as [`Vocabulary::encode`] gives them; `sorts` and `slots`: of the utterance.
-    pub fn new(
+    pub(super) fn new(
         vocabulary: &Vocabulary,
         choices: Vec<Choice>,
         sorts: &[Symbol],
@@ -50,7 +50,7 @@ pub(super) struct Sources {
 
 impl Sources {
     /// - `lengths`: words of each row of `reader`.
-    pub fn new(
+    pub(super) fn new(
         layout: Layout,
         parameters: &[f32],
         read: &[f32],
@@ -85,7 +85,7 @@ pub(super) struct Look {
 
 impl Look {
     /// - `keys`, `read`: of one utterance; `context`: overwritten, `[2·units]`.
-    pub fn forward(
+    pub(super) fn forward(
         units: usize,
         state: &[f32],
         keys: &[f32],
@@ -147,7 +147,7 @@ pub(super) struct Writer {
 impl Writer {
     /// What each row's program costs, in nats. The gradients of `backward` are those of their sum
     /// times `weight`.
-    pub fn forward(
+    pub(super) fn forward(
         &mut self,
         layout: Layout,
         parameters: &[f32],
@@ -280,7 +280,7 @@ impl Writer {
 
     /// Adds the gradient of the decoder's parameters to `gradient`, and gives that of what was read,
     /// `[words × 2·units]`.
-    pub fn backward(
+    pub(super) fn backward(
         &self,
         layout: Layout,
         parameters: &[f32],
