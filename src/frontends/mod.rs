@@ -15,6 +15,7 @@ mod orders;
 mod outbox;
 mod passes;
 mod probe;
+#[allow(unsafe_code, reason = "it calls functions of libzmq")]
 mod raw;
 mod rights;
 mod unsent;

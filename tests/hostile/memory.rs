@@ -20,20 +20,24 @@ fn note(bytes: isize) {
     });
 }
 
-// SAFETY: every call is handed on to the system's allocator as it came; counting allocates nothing.
+// SAFETY: every call is passed on to the system's allocator unchanged; counting allocates nothing.
+#[allow(unsafe_code, reason = "an allocator is an unsafe trait")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size() as isize);
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         note(layout.size() as isize);
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
         note(-(layout.size() as isize));
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.dealloc(place, layout) }
     }
 
@@ -41,6 +45,7 @@ unsafe impl GlobalAlloc for Counting {
         // Both are there while one is copied to the other.
         note(size as isize);
         note(-(layout.size() as isize));
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.realloc(place, layout, size) }
     }
 }
