@@ -1,10 +1,8 @@
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 use super::TenantEvent;
 use crate::ids::{Digest, Seq, UserId};
-use crate::language::{Answer, Document, Program, Utterance};
+use crate::language::{Answer, Document, Program, Report, Utterance};
 
 /// A fact of one person's life with the robot. Domain-neutral; what a domain knows travels inside
 /// [`Document`] and [`Program`].
@@ -149,16 +147,6 @@ pub struct LessonForgotten {
 pub struct RetrainScheduled {
     pub recipe: Digest,
     pub lessons: Vec<Seq>,
-}
-
-/// What a training measured about itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-pub struct Report {
-    /// Seeds and live lessons.
-    pub exemplars: u32,
-    pub threshold: f32,
-    /// Everything else the parser kind reports, by name.
-    pub figures: BTreeMap<String, f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

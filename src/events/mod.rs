@@ -7,11 +7,12 @@ mod record;
 mod tenant;
 mod upcast;
 
+pub use crate::language::Report;
 pub use codec::{DecodeError, decode, encode};
 pub use event::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
-    EventKind, Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed,
-    RetrainScheduled, SessionClosed, SessionOpened,
+    EventKind, Interpreted, LessonForgotten, RetrainCompleted, RetrainFailed, RetrainScheduled,
+    SessionClosed, SessionOpened,
 };
 pub use receipt::Durable;
 pub use record::{Batch, Head, Header, HeaderError, Record, Times, commitment};

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::Phase;
-use super::state::{Action, Episode, LiveLesson, Opened, State, Training, Unexplained};
+use super::state::{Action, Episode, LiveLesson, Opened, State, Unexplained};
 use crate::events::{
     DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, Head, Interpreted, Record,
     RetrainCompleted, SessionOpened,
@@ -37,7 +37,7 @@ pub fn apply<D: World>(
     agree(seq, "sequence number", seq.get(), state.head.seq + 1)?;
     agree(seq, "predecessor", record.prev, state.head.digest)?;
     apply_event(domain, state, seq, &record.event)?;
-    state.head = Head { seq: seq.get(), digest: record.digest }.into();
+    state.head = Head { seq: seq.get(), digest: record.digest };
     state.last_at = record.at;
     state.requests.note(record.request, seq);
     Ok(())
@@ -68,10 +68,9 @@ pub(super) fn apply_event<D: World>(
         }
         Event::LessonForgotten(event) => forget(state, seq, event.lesson)?,
         Event::RetrainScheduled(event) => {
-            let training = Training { recipe: event.recipe, lessons: event.lessons.clone() };
             let live: Vec<Seq> = state.lessons.iter().map(|live| live.seq).collect();
             agree(seq, "live lessons", seqs(&event.lessons), seqs(&live))?;
-            state.training = Some(training);
+            state.training = Some(event.clone());
             state.phase = Phase::Learning;
         }
         Event::RetrainCompleted(event) => complete(state, seq, event)?,

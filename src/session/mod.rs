@@ -145,7 +145,7 @@ impl<D: World> Session<D> {
     }
 
     pub fn head(&self) -> Head {
-        self.state.head.into()
+        self.state.head
     }
 
     pub fn phase(&self) -> Phase {

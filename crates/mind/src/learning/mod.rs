@@ -14,10 +14,11 @@ pub mod recipe;
 mod tests;
 mod train;
 
+pub use crate::language::Report;
 pub use code::{code_digest, mind_schema, pinned};
 pub use error::TrainError;
 pub use lesson::Lesson;
 pub use lift::lift;
 pub use mind::Mind;
-pub use recipe::{Recipe, RecipeError, Report};
+pub use recipe::{Recipe, RecipeError};
 pub use train::train;

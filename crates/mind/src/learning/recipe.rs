@@ -1,4 +1,3 @@
-use std::collections::BTreeMap;
 use std::sync::{LazyLock, OnceLock};
 
 use serde::{Deserialize, Serialize};
@@ -54,8 +53,8 @@ pub struct WordSettings {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lifting {
-    /// Whether a thing in the hand that was not mentioned becomes `<held>` in the lifted program. If not,
-    /// it stays the type that it was, as in the paper.
+    /// Whether a thing in the hand that was not mentioned becomes `<held>` in the lifted program.
+    /// If not, it stays the type that it was, as in the paper.
     pub held: bool,
 }
 
@@ -135,8 +134,8 @@ impl Recipe {
     /// The names of the built-in recipes for people; `tiny` is for tests.
     pub const BUILTIN: [&'static str; 6] =
         ["default-1", "default-2", "paper", "grammar", "seq2seq", "seq2seq-grammar"];
-    /// The recipe that the name `default` means today. A new person or study gets it under its own name,
-    /// and only that name is recorded.
+    /// The recipe that the name `default` means today. A new person or study gets it under its own
+    /// name, and only that name is recorded.
     pub const DEFAULT: &'static str = "default-2";
 
     /// The TOML text of a built-in recipe; none for another name.
@@ -205,9 +204,9 @@ impl Recipe {
         Ok(Recipe { name, settings, words, digest })
     }
 
-    /// The same settings under another digest, and so with another training seed. For evaluations, which
-    /// must separate the quality of a method from the luck of one training. No person's mind is trained
-    /// with it.
+    /// The same settings under another digest, and so with another training seed. For evaluations,
+    /// which must separate the quality of a method from the luck of one training. No person's mind
+    /// is trained with it.
     pub fn reseeded(&self, seed: u64) -> Recipe {
         let mut hasher = blake3::Hasher::new_derive_key("apprentice 2026 evaluation seed");
         hasher.update(&self.digest.0);
@@ -324,8 +323,8 @@ fn at(toml: &str, start: usize, reason: String) -> RecipeError {
     RecipeError { line, column, reason }
 }
 
-/// Where a field of a section is in the text, in bytes from 0; the head of the section when the field is
-/// not written, 0 when the section is not.
+/// Where a field of a section is in the text, in bytes from 0; the head of the section when the
+/// field is not written, 0 when the section is not.
 fn locate(toml: &str, section: &str, field: &str) -> usize {
     let head = format!("[{section}]");
     let mut inside = section.is_empty();
@@ -349,20 +348,10 @@ fn locate(toml: &str, section: &str, field: &str) -> usize {
     found
 }
 
-/// What a training measured about itself.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Report {
-    /// Seeds and lessons.
-    pub exemplars: u32,
-    /// Of the trained parser; the unit is its distance's.
-    pub threshold: f32,
-    /// What else the parser and the reranker measured, by name.
-    pub figures: BTreeMap<String, f64>,
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
 
     #[test]
