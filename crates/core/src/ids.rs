@@ -109,7 +109,8 @@ impl TenantId {
         }
     }
 
-    /// Whether a new tenant may have this name. Older versions allowed more names; such tenants stay.
+    /// Whether a new tenant may have this name. Older versions allowed more names; such tenants
+    /// stay.
     ///
     /// - errors: a leading hyphen.
     pub fn check_new(&self) -> Result<(), IdError> {
@@ -165,8 +166,8 @@ impl UserId {
         }
     }
 
-    /// Whether a new person may have this name: two names that look the same must be one name. Older
-    /// versions allowed more names; people recorded under them stay reachable.
+    /// Whether a new person may have this name: two names that look the same must be one name.
+    /// Older versions allowed more names; people recorded under them stay reachable.
     ///
     /// - errors: a [hidden](plain::check) character; white space at an end; white space other than
     ///   U+0020.
@@ -351,9 +352,9 @@ macro_rules! byte_id {
 byte_id!(
     /// The keyed hash that stands for a user name. 16 bytes.
     ///
-    /// It names a stream only together with a tenant: every tenant's own stream has the same key. So
-    /// it has no order and no hash, and no map can be indexed by it alone. Index by [`StreamId`], or
-    /// use [`WithinTenant`] inside one tenant.
+    /// It names a stream only together with a tenant: every tenant's own stream has the same key.
+    /// So it has no order and no hash, and no map can be indexed by it alone. Index by
+    /// [`StreamId`], or use [`WithinTenant`] inside one tenant.
     ///
     /// ```compile_fail,E0277
     /// let mut streams = std::collections::BTreeMap::new();
@@ -391,8 +392,8 @@ byte_id!(
 );
 
 impl StreamKey {
-    /// The tenant's own stream, with what operators did. A user name hashes to it with a probability
-    /// of one in 2^128.
+    /// The tenant's own stream, with what operators did. A user name hashes to it with a
+    /// probability of one in 2^128.
     pub const TENANT: StreamKey = StreamKey([0; 16]);
 }
 
@@ -466,16 +467,16 @@ pub struct Timestamp(
 
 impl Timestamp {
     /// The time of the record after one with this time. Times never run backwards within a stream:
-    /// where the wall clock is not later than the record before, the time is *held*, one microsecond
-    /// after that record's.
+    /// where the wall clock is not later than the record before, the time is *held*, one
+    /// microsecond after that record's.
     pub fn next(self, wall: Timestamp) -> Timestamp {
         wall.max(Timestamp(self.0.saturating_add(1)))
     }
 
     /// Whether this is a held time (see [`Timestamp::next`]) when the batch before has the time
-    /// `before`. Two batches are never made within one microsecond, so a reading of the clock is never
-    /// taken for a held time. Builds before the release of 0.2 held the times of tenants' own streams
-    /// at `before` itself.
+    /// `before`. Two batches are never made within one microsecond, so a reading of the clock is
+    /// never taken for a held time. Builds before the release of 0.2 held the times of tenants' own
+    /// streams at `before` itself.
     pub fn is_held(self, before: Timestamp) -> bool {
         self.0 <= before.0.saturating_add(1)
     }

@@ -1,12 +1,12 @@
-//! The laws by name. The name is what an assertion, a test and a bug report use.
+//! The laws by name. Assertions, tests and bug reports use these names.
 
 use std::fmt;
 
 /// What must always hold; see `ARCHITECTURE.md`, *Laws*.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Invariant {
-    /// A reply exists only for durable events. Kept by type: `Session::settle` demands a receipt
-    /// that only `store/` can make.
+    /// A reply exists only for durable events. Kept by type: `Session::settle` needs a receipt that
+    /// only `store/` can make.
     DurableBeforeReply,
     /// One stream has one writer at a time: `append` carries the expected head.
     SingleWriter,

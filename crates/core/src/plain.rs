@@ -8,7 +8,8 @@
 //! Two kinds are needed, and are hidden only in the wrong place:
 //! - joiners (U+200C, U+200D), which hold emoji together and shape Persian and Indic scripts, may
 //!   stand between two visible characters that are not ASCII;
-//! - variation selectors may follow one visible character that is not ASCII, or a digit, `#` or `*`.
+//! - variation selectors may follow one visible character that is not ASCII, or a digit, `#` or
+//!   `*`.
 //!
 //! Every other character is plain, in every script, and neither function changes it.
 
@@ -59,8 +60,8 @@ pub fn escape_json(json: &str) -> Cow<'_, str> {
     escape_but(json, |c| matches!(c, '\n' | '\t'), json_form)
 }
 
-/// The text with U+FFFD in the place of each hidden character. It has as many words and clause marks
-/// as before, and [`check`] accepts it.
+/// The text with U+FFFD in the place of each hidden character. It has as many words and clause
+/// marks as before, and [`check`] accepts it.
 pub fn replace(text: &str) -> Cow<'_, str> {
     escape_but(text, |_| false, |out, _| out.push('\u{fffd}'))
 }

@@ -16,8 +16,8 @@ pub(super) fn remaining(scene: &Scene, task: &Task) -> u32 {
     if achieved(scene, task) {
         return 0;
     }
-    // The rules look at pairs of things. In a scene with hundreds of apples and tables, a weaker bound
-    // is faster in all.
+    // The rules look at pairs of things. In a scene with hundreds of apples and tables, a weaker
+    // bound is faster in all.
     let count = |kind: &Kind| scene.of(*kind).count();
     if task.needs().iter().map(count).product::<usize>() > PAIRS_MAX {
         return 1;

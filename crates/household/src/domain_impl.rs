@@ -15,8 +15,8 @@ use crate::world::{
     Words, World,
 };
 
-/// The household as a world: facts, names and seeds, read once from the embedded tables. Make one per
-/// process and share it behind an `Arc`.
+/// The household as a world: facts, names and seeds, read once from the embedded tables. Make one
+/// per process and share it behind an `Arc`.
 #[derive(Debug)]
 pub struct Household {
     signature: Signature,
@@ -41,8 +41,8 @@ impl Household {
         Household { signature, lexicons: Edition::ALL.map(words::lexicon), seeds: words::seeds() }
     }
 
-    /// The recorded tasks of one form, in the words of [`Task::read`], each once; empty for a form that
-    /// was not recorded.
+    /// The recorded tasks of one form, in the words of [`Task::read`], each once; empty for a form
+    /// that was not recorded.
     pub fn recorded_tasks(&self, form: &str) -> Vec<&'static str> {
         let rooms = Room::ALL.iter().map(|room| facts().room(*room).tasks.get(form));
         let mut tasks: Vec<&str> = rooms.flatten().flatten().map(String::as_str).collect();
@@ -160,8 +160,8 @@ impl Words for Household {
         if here.is_empty() {
             return mention.types.clone();
         }
-        // A rare meaning comes after all others, even if it is nearer. Of equally near kinds, the one
-        // that people mean more often by the name comes first.
+        // A rare meaning comes after all others, even if it is nearer. Of equally near kinds, the
+        // one that people mean more often by the name comes first.
         here.sort_unstable();
         here.into_iter().map(|(_, _, rank)| mention.types[rank].clone()).collect()
     }

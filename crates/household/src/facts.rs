@@ -7,8 +7,8 @@ use serde::Deserialize;
 use super::words::nearest_word;
 use crate::language::Symbol;
 
-/// A kind of thing: `Mug`, `Fridge`. An index into the table of kinds, in the order of the numbers of
-/// `data/types.toml`. The number of a kind never changes.
+/// A kind of thing: `Mug`, `Fridge`. An index into the table of kinds, in the order of the numbers
+/// of `data/types.toml`. The number of a kind never changes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Kind(pub(super) u8);
 

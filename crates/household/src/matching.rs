@@ -11,10 +11,10 @@ use crate::world::Lexicon;
 /// A request for a scene in which a given program runs. An evaluation needs it: it has a recorded
 /// sentence and its program, but no recorded scene.
 ///
-/// The scene has the things that the program names, and `others` more things of the room, drawn from
-/// `seed`. The robot stands where the program needs it and holds what the program needs. Doors are open
-/// or shut as the program needs them. A type that it picks up without saying from where is somewhere
-/// in the room.
+/// The scene has the things that the program names, and `others` more things of the room, drawn
+/// from `seed`. The robot stands where the program needs it and holds what the program needs. Doors
+/// are open or shut as the program needs them. A type that it picks up without saying from where is
+/// somewhere in the room.
 #[derive(Debug, Clone)]
 pub struct MatchingScene<'a> {
     /// The kind of room.
@@ -54,8 +54,8 @@ const REPAIRS_MAX: usize = 100;
 impl MatchingScene<'_> {
     /// Builds the scene.
     ///
-    /// - errors: a sentence with the step, when no scene fits the program (it puts a Mug on a Sofa), or
-    ///   when it names something that is not a type.
+    /// - errors: a sentence with the step, when no scene fits the program (it puts a Mug on a
+    ///   Sofa), or when it names something that is not a type.
     pub fn build(&self, lexicon: &Lexicon) -> Result<Scene, String> {
         let actions: Vec<Action> =
             self.program.steps.iter().map(Action::read).collect::<Result<_, _>>()?;
@@ -334,8 +334,8 @@ impl Sketch {
         }
     }
 
-    /// Puts a carriable thing without a place in or on something that can hold it and is not behind a
-    /// door, and a further lamp on a table.
+    /// Puts a carriable thing without a place in or on something that can hold it and is not behind
+    /// a door, and a further lamp on a table.
     fn settle_down(&mut self, number: usize, random: &mut Random) {
         let wish = &self.things[number];
         let used = self.held == Some(number) || self.stands_at == Some(number);

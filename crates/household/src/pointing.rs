@@ -36,8 +36,8 @@ pub(super) fn choose(
         choice.other(&choice.handled(pointing))?;
     }
     let known_place = |p: &&Vec<Symbol>| (several || pointing.strictly) && is_here(scene, p);
-    // The words about a place are ignored when there is only one such thing, or when the scene has no
-    // such place: people name places as they see them.
+    // The words about a place are ignored when there is only one such thing, or when the scene has
+    // no such place: people name places as they see them.
     if let Some(places) = pointing.place.as_ref().filter(|p| known_place(p)) {
         choice.place(places)?;
     }
@@ -129,8 +129,8 @@ impl<'a> Choice<'a> {
         Ok(())
     }
 
-    /// The things of the kind that were handled, newest first. The thing in the hand counts as handled,
-    /// even if it was there at the start.
+    /// The things of the kind that were handled, newest first. The thing in the hand counts as
+    /// handled, even if it was there at the start.
     fn handled(&self, pointing: &Pointing) -> Vec<Index> {
         let named = pointing.handled.iter().filter_map(|name| self.scene.named(name));
         let all = named.chain(self.scene.robot.holds);

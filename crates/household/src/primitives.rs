@@ -190,7 +190,8 @@ fn open(scene: &mut Scene, wanted: Wanted) -> Result<Bound, Refusal> {
         let object = scene.object(index);
         match (object.shut(), object.is(State::On)) {
             (false, _) => Err(Refusal::AlreadyOpen(index)),
-            // A laptop may run with its lid closed. Only a thing that works behind its door must be shut.
+            // A laptop may run with its lid closed. Only a thing that works behind its door must be
+            // shut.
             (true, true) if kind.receptacle() => Err(Refusal::Running(index)),
             (true, _) => Ok(()),
         }
@@ -248,12 +249,12 @@ fn reachable(scene: &Scene, index: Index) -> Result<(), Refusal> {
 /// The order in which instances are taken, smallest first. The distance comes last.
 type Order = (bool, bool, (i64, i64));
 
-/// The nearest of the candidates that `can` be used. With a task (for walking and picking up), things
-/// that are not yet at their goal come first, and among these, things in sight. Ties go to the earlier
-/// thing.
+/// The nearest of the candidates that `can` be used. With a task (for walking and picking up),
+/// things that are not yet at their goal come first, and among these, things in sight. Ties go to
+/// the earlier thing.
 ///
-/// - errors: why the nearest candidate cannot be used. A candidate in reach comes first, because its
-///   reason says more than "out of reach".
+/// - errors: why the nearest candidate cannot be used. A candidate in reach comes first, because
+///   its reason says more than "out of reach".
 fn bind(
     scene: &Scene,
     wanted: Wanted,

@@ -110,8 +110,8 @@ impl Refusal {
         }
     }
 
-    /// The one action that is missing before this one, where one is enough, and the instance for it:
-    /// none unless the refused thing was chosen.
+    /// The one action that is missing before this one, where one is enough, and the instance for
+    /// it: none unless the refused thing was chosen.
     pub(crate) fn first(self, scene: &Scene, chosen: Chosen) -> Option<(Action, Option<Index>)> {
         let kind = |index: Index| scene.object(index).kind;
         let (action, refused, target) = match self {

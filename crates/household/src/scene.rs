@@ -35,8 +35,8 @@ pub(super) struct Object {
     pub kind: Kind,
     /// Bits of [`State`].
     pub states: u8,
-    /// Centimetres to the east. 0 for a thing in the hand and all that it contains: they are where the
-    /// robot is ([`Scene::place`]).
+    /// Centimetres to the east. 0 for a thing in the hand and all that it contains: they are where
+    /// the robot is ([`Scene::place`]).
     pub x: i16,
     /// Centimetres to the north; 0 where `x` is 0 for the hand.
     pub y: i16,
@@ -162,8 +162,8 @@ impl Scene {
         }
     }
 
-    /// How far the thing is, in square centimetres: to its [`Scene::root`] (0 for what is in reach),
-    /// then to the thing itself. Integers, so equal on every machine.
+    /// How far the thing is, in square centimetres: to its [`Scene::root`] (0 for what is in
+    /// reach), then to the thing itself. Integers, so equal on every machine.
     pub(super) fn distance(&self, index: Index) -> (i64, i64) {
         let square = |(x, y): (i16, i16)| {
             let dx = i64::from(x) - i64::from(self.robot.x);
@@ -195,7 +195,8 @@ impl Scene {
             None => (name, 1),
         };
         let index = self.of(Kind::named(kind)?).nth(number.checked_sub(1)?)?;
-        // With several mugs, "Mug" names none of them. With one, "Mug 1" and "Mug 02" do not name it.
+        // With several mugs, "Mug" names none of them. With one, "Mug 1" and "Mug 02" do not name
+        // it.
         (self.name(index) == name).then_some(index)
     }
 

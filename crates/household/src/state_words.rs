@@ -17,8 +17,8 @@ pub(super) enum StateWord {
     Full,
 }
 
-/// The words of each state. Released recipes use [`StateWord::opposite`] of clean, cold and hot, so a
-/// change in these three rows would change their answers.
+/// The words of each state. Released recipes use [`StateWord::opposite`] of clean, cold and hot, so
+/// a change in these three rows would change their answers.
 const WORDS: [(&[&str], StateWord); 10] = [
     (&["clean", "cleaned", "washed", "rinsed"], StateWord::Clean),
     (&["cold", "chilled", "cooled"], StateWord::Cold),

@@ -1,5 +1,5 @@
-//! Recorded steps and reasons, as the robot says them to a person. The records keep the words of the
-//! world, because an audit compares them; only what is shown is different.
+//! Recorded steps and reasons, as the robot says them to a person. The records keep the words of
+//! the world, because an audit compares them; only what is shown is different.
 
 use super::facts::facts;
 use super::refusal::preposition;
@@ -87,8 +87,8 @@ fn in_lower_case(word: &str) -> String {
     }
 }
 
-/// Says "it" for the thing in a reason, because the request has named it. A thing with a number keeps
-/// its name, because the number says which one it is.
+/// Says "it" for the thing in a reason, because the request has named it. A thing with a number
+/// keeps its name, because the number says which one it is.
 fn it_for(thing: &str, told: &str) -> String {
     let Some((before, after)) = told.split_once(thing) else { return told.to_owned() };
     let goes_on = after.trim_start().starts_with(|c: char| c.is_ascii_digit());

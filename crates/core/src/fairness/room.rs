@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use crate::ids::TenantId;
 
 /// Room that tenants share: a tenant may take as much as it leaves free. One tenant alone gets
-/// `most`, which is half of the room. Two that want everything get a third of the room each, three a
-/// quarter each, and so on. So a new tenant always finds some.
+/// `most`, which is half of the room. Two that want everything get a third of the room each, three
+/// a quarter each, and so on. So a new tenant always finds some.
 #[derive(Debug)]
 pub struct Room {
     most: usize,
@@ -15,7 +15,8 @@ pub struct Room {
 impl Room {
     /// An empty room.
     ///
-    /// - `most`: what one tenant alone may take; the room is twice as large. The unit is the caller's.
+    /// - `most`: what one tenant alone may take; the room is twice as large. The unit is the
+    ///   caller's.
     pub fn new(most: usize) -> Room {
         Room { most, total: 0, held: BTreeMap::new() }
     }

@@ -14,8 +14,8 @@ pub struct Answer {
     pub evidence: Evidence,
     /// The type that the last mention meant: what a later "it" means while the hand is empty.
     pub mentioned: Option<Symbol>,
-    /// Per step and argument the thing that words chose ("mug 2", "the other one"). Empty when words
-    /// chose none; then the world chooses, now and at every replay.
+    /// Per step and argument the thing that words chose ("mug 2", "the other one"). Empty when
+    /// words chose none; then the world chooses, now and at every replay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub chosen: Vec<Vec<Option<String>>>,
 }
@@ -26,14 +26,14 @@ impl Answer {
         self.chosen.get(step).map_or(&[], Vec::as_slice)
     }
 
-    /// Whether the utterance is a request for something to be done now. Only a request can be taught:
-    /// no question, no statement, no prohibition.
+    /// Whether the utterance is a request for something to be done now. Only a request can be
+    /// taught: no question, no statement, no prohibition.
     pub fn asks(&self) -> bool {
         self.evidence.mood.is_none()
     }
 
-    /// Whether the program, or part of it, was a guess: it came from a network that answers everything,
-    /// for words that nobody taught it.
+    /// Whether the program, or part of it, was a guess: it came from a network that answers
+    /// everything, for words that nobody taught it.
     pub fn guessed(&self) -> bool {
         let Evidence { lifted, nearest, answered_by, .. } = &self.evidence;
         let taught = |clause: &LiftedUtterance| nearest.iter().any(|near| near.exemplar == *clause);

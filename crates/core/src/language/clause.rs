@@ -2,8 +2,8 @@ use super::{LiftedUtterance, Mention, Word};
 
 /// One clause as the parser gets it: its lifted form, and what lifting removed.
 ///
-/// Some parsers read only [`Clause::lifted`]. Others also look at what was removed: the dropped words
-/// of "the *red* mug", and the names of the objects.
+/// Some parsers read only [`Clause::lifted`]. Others also look at what was removed: the dropped
+/// words of "the *red* mug", and the names of the objects.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Clause {
     /// The words, with a slot for each mention.
@@ -27,7 +27,8 @@ impl Clause {
 
     /// A clause of some of this one's lifted words.
     ///
-    /// - `places`: 0-based, in rising order. A slot brings its attributes, its mention and its name.
+    /// - `places`: 0-based, in rising order. A slot brings its attributes, its mention and its
+    ///   name.
     pub fn pick(&self, places: &[usize]) -> Clause {
         let mut out = Clause::default();
         let mut slot = 0;

@@ -3,8 +3,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::ids::Digest;
 
-/// A scene or a task of any world, in a form that can be carried, stored and printed without knowing
-/// the world. It has no floating-point numbers: worlds use integer units.
+/// A scene or a task of any world, in a form that can be carried, stored and printed without
+/// knowing the world. It has no floating-point numbers: worlds use integer units.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Document(serde_json::Value);

@@ -2,8 +2,8 @@ use std::collections::BTreeMap;
 
 use super::Symbol;
 
-/// How often recorded people used a word in a clause that meant each operator. This is what is known
-/// about a language before anybody has taught anything. It counts single words and holds no
+/// How often recorded people used a word in a clause that meant each operator. This is what is
+/// known about a language before anybody has taught anything. It counts single words and holds no
 /// sentences.
 ///
 /// `V:` marks a clause's main verb; `V:pick_up` is a verb with its particle, `V:take+from` a verb
@@ -19,8 +19,8 @@ pub struct Habits {
 }
 
 impl Habits {
-    /// How many clauses of each operator have the word, in the order of [`Habits::order`]; none for a
-    /// word that nobody used.
+    /// How many clauses of each operator have the word, in the order of [`Habits::order`]; none for
+    /// a word that nobody used.
     pub fn counts(&self, word: &str) -> Option<&[u32]> {
         self.words.get(word).map(Vec::as_slice)
     }

@@ -148,7 +148,8 @@ impl LiftedProgram {
     /// The program with each slot filled by its mention, and `<held>` by what the robot holds.
     ///
     /// - `mentioned`: the type that each mention means, in order.
-    /// - returns: none when a slot has no mention, or the program has `<held>` and the hand is empty.
+    /// - returns: none when a slot has no mention, or the program has `<held>` and the hand is
+    ///   empty.
     pub fn fill(&self, mentioned: &[Symbol], held: Option<&Symbol>) -> Option<Program> {
         let fill_arg = |arg: &LiftedArg| match arg {
             LiftedArg::Slot { number, .. } => mentioned.get(*number as usize - 1).cloned(),

@@ -2,8 +2,8 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-/// Words of a language by what they do in a clause, whatever they mean. They are data of a recipe, so
-/// another language is another file.
+/// Words of a language by what they do in a clause, whatever they mean. They are data of a recipe,
+/// so another language is another file.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WordLists {

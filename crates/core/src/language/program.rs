@@ -67,7 +67,7 @@ impl FromStr for Program {
     }
 }
 
-/// Splits at `;` and reads each part; shared with lifted programs.
+/// Splits at `;` and reads each part, for programs and lifted programs.
 pub(super) fn parse_steps<S: FromStr<Err = ProgramError>>(
     text: &str,
 ) -> Result<Vec<S>, ProgramError> {

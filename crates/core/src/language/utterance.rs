@@ -45,8 +45,8 @@ impl Utterance {
         Utterance::admit(text, plain::check)
     }
 
-    /// An utterance from a record. Older versions refused control characters alone, so their records
-    /// may have other hidden characters.
+    /// An utterance from a record. Older versions refused control characters alone, so their
+    /// records may have other hidden characters.
     ///
     /// - errors: as [`Utterance::new`], but of the hidden characters only control characters are
     ///   refused.

@@ -78,7 +78,8 @@ impl Adam {
             mean: self.mean.as_mut_ptr(),
             square: self.square.as_mut_ptr(),
         };
-        // SAFETY: all four lists have `count` numbers: two were checked, `new` made the other two so.
+        // SAFETY: all four lists have `count` numbers: two were checked, `new` made the other two
+        // so.
         unsafe { run(step, lists) }
     }
 }
@@ -105,8 +106,8 @@ struct Lists {
 dispatch!(run, all, (step: Step, lists: Lists));
 
 /// # Safety
-/// The machine has the instruction set of `L`. The lists are valid for reads of `count` numbers, and
-/// all but the gradient for writes.
+/// The machine has the instruction set of `L`. The lists are valid for reads of `count` numbers,
+/// and all but the gradient for writes.
 #[inline(always)]
 unsafe fn all<L: Lanes>(step: Step, lists: Lists) {
     let mut at = 0;

@@ -1,7 +1,7 @@
 use super::lanes::{Lanes, One, dispatch};
 
-/// eˣ, relative error below 2e-7. For x below −87 or above 88 it is the value at that limit, so that
-/// no result is infinite, zero or denormal (denormals are slow).
+/// eˣ, relative error below 2e-7. For x below −87 or above 88 it is the value at that limit, so
+/// that no result is infinite, zero or denormal (denormals are slow).
 pub fn exp(x: f32) -> f32 {
     // SAFETY: one lane needs no instruction set.
     unsafe { exp_lanes::<One>(x) }
@@ -35,8 +35,8 @@ pub fn tanh(x: f32) -> f32 {
     libm::tanhf(x)
 }
 
-/// Replaces every entry by its tanh, computed as 2σ(2x) − 1: absolute error below 2e-7. Networks use
-/// it because [`tanh`] would take most of their time. Its bits are not those of [`tanh`].
+/// Replaces every entry by its tanh, computed as 2σ(2x) − 1: absolute error below 2e-7. Networks
+/// use it because [`tanh`] would take most of their time. Its bits are not those of [`tanh`].
 pub fn tanh_all(x: &mut [f32]) {
     // SAFETY: the pointer and the length are those of one slice.
     unsafe { tanh_each(x.as_mut_ptr(), x.len()) }
@@ -81,7 +81,8 @@ dispatch!(sigmoid_each, sigmoid_body, (x: *mut f32, count: usize));
 dispatch!(tanh_each, tanh_body, (x: *mut f32, count: usize));
 
 /// # Safety
-/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count` numbers.
+/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count`
+/// numbers.
 #[inline(always)]
 unsafe fn exp_body<L: Lanes>(x: *mut f32, count: usize) {
     let mut at = 0;
@@ -99,7 +100,8 @@ unsafe fn exp_body<L: Lanes>(x: *mut f32, count: usize) {
 }
 
 /// # Safety
-/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count` numbers.
+/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count`
+/// numbers.
 #[inline(always)]
 unsafe fn sigmoid_body<L: Lanes>(x: *mut f32, count: usize) {
     let mut at = 0;
@@ -117,7 +119,8 @@ unsafe fn sigmoid_body<L: Lanes>(x: *mut f32, count: usize) {
 }
 
 /// # Safety
-/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count` numbers.
+/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count`
+/// numbers.
 #[inline(always)]
 unsafe fn tanh_body<L: Lanes>(x: *mut f32, count: usize) {
     let mut at = 0;

@@ -23,8 +23,8 @@ pub enum Sink {
 /// `c = a · b`, all row-major: `a` is `[rows × inner]`, `b` is `[inner × columns]`.
 ///
 /// Same bits on every machine: each entry starts at 0 (or at its present number) and adds its terms
-/// for `inner = 0, 1, 2, …`, product and sum rounded separately. Lanes lie along the columns, so the
-/// width of the machine's vectors does not change that order.
+/// for `inner = 0, 1, 2, …`, product and sum rounded separately. Lanes lie along the columns, so
+/// the width of the machine's vectors does not change that order.
 ///
 /// - panics: a slice does not have the size that `shape` says.
 pub fn gemm(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink: Sink) {
@@ -38,7 +38,8 @@ pub fn gemm_transposed_a(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink
     product(shape, a, [1, shape.rows], b, c, sink);
 }
 
-/// [`gemm`] as a plain triple loop with the same order of summation. The kernels are tested against it.
+/// [`gemm`] as a plain triple loop with the same order of summation. The kernels are tested against
+/// it.
 ///
 /// - panics: a slice is smaller than `shape` says.
 pub fn gemm_oracle(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink: Sink) {
@@ -91,8 +92,8 @@ dispatch!(run, all, (task: Task, a: *const f32, b: *const f32, c: *mut f32));
 const ROWS: usize = 4;
 
 /// # Safety
-/// The machine has the instruction set of `L`. `a` and `b` are valid for reads and `c` for writes of
-/// the matrices that `task` describes.
+/// The machine has the instruction set of `L`. `a` and `b` are valid for reads and `c` for writes
+/// of the matrices that `task` describes.
 #[inline(always)]
 unsafe fn all<L: Lanes>(task: Task, a: *const f32, b: *const f32, c: *mut f32) {
     let Shape { rows, columns, .. } = task.shape;

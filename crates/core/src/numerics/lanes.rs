@@ -1,6 +1,6 @@
 //! The operations that kernels are written with, the same for every instruction set. A kernel is
-//! written once over [`Lanes`] and compiled for each set. Every operation is one IEEE-754 operation per
-//! lane, so the results have the same bits for every width.
+//! written once over [`Lanes`] and compiled for each set. Every operation is one IEEE-754 operation
+//! per lane, so the results have the same bits for every width.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -44,8 +44,8 @@ impl Kernel {
         FORCED.store(kernel.map_or(0, |kernel| kernel as u8), Ordering::Relaxed);
     }
 
-    /// Runs `task` with this kernel, for tests and measurements. Callers of one process wait for each
-    /// other.
+    /// Runs `task` with this kernel, for tests and measurements. Callers of one process wait for
+    /// each other.
     ///
     /// - panics: as [`Kernel::force`].
     pub fn run<T>(self, task: impl FnOnce() -> T) -> T {
@@ -180,12 +180,14 @@ mod x86 {
                 }
                 #[inline(always)]
                 unsafe fn load(from: *const f32) -> $vector {
-                    // SAFETY: the caller has the instruction set, and a pointer valid for `WIDTH` numbers.
+                    // SAFETY: the caller has the instruction set, and a pointer valid for `WIDTH`
+                    // numbers.
                     unsafe { $load(from) }
                 }
                 #[inline(always)]
                 unsafe fn store(to: *mut f32, value: $vector) {
-                    // SAFETY: the caller has the instruction set, and a pointer valid for `WIDTH` numbers.
+                    // SAFETY: the caller has the instruction set, and a pointer valid for `WIDTH`
+                    // numbers.
                     unsafe { $store(to, value) }
                 }
                 #[inline(always)]
@@ -260,8 +262,8 @@ macro_rules! dispatch {
                     unsafe { $body::<$crate::numerics::lanes::Eight>($($arg),*) }
                 }
                 match $crate::numerics::Kernel::current() {
-                    // SAFETY: `Kernel::current` names only what this machine has, here AVX2, and the
-                    // pointers are the caller's.
+                    // SAFETY: `Kernel::current` names only what this machine has, here AVX2, and
+                    // the pointers are the caller's.
                     $crate::numerics::Kernel::Avx2 => return unsafe { eight($($arg),*) },
                     $crate::numerics::Kernel::Sse2 => {
                         // SAFETY: every x86-64 has SSE2, and the pointers are the caller's.

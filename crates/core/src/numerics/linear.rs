@@ -58,7 +58,8 @@ impl Linear {
 
     /// Adds the gradient of the parameters to `gradient`, and writes the gradient of `x`.
     ///
-    /// - `x`: what [`Linear::forward`] was given; `dy`: `[rows × outputs]`, the gradient of its result.
+    /// - `x`: what [`Linear::forward`] was given; `dy`: `[rows × outputs]`, the gradient of its
+    ///   result.
     /// - `gradient`: laid out as `parameters`.
     /// - `dx`: `[rows × inputs]`, overwritten; none if it is not needed.
     /// - panics: a slice does not have its size.
@@ -95,7 +96,7 @@ pub fn relu(x: &mut [f32]) {
     x.iter_mut().for_each(|x| *x = if *x > 0.0 { *x } else { 0.0 });
 }
 
-/// Stops the gradient where [`relu`] gave 0; `y` is its result.
+/// Sets the gradient to 0 where [`relu`] gave 0; `y` is the result of [`relu`].
 pub fn relu_backward(y: &[f32], dy: &mut [f32]) {
     for (d, &y) in dy.iter_mut().zip(y) {
         *d = if y > 0.0 { *d } else { 0.0 };

@@ -109,7 +109,8 @@ impl Mlp {
 
     /// Adds the gradient of the parameters to `gradients`, and writes the gradient of `x`.
     ///
-    /// - `x`, `trace`: those of the forward pass; `dy`: `[rows × outputs]`, the gradient of its result.
+    /// - `x`, `trace`: those of the forward pass; `dy`: `[rows × outputs]`, the gradient of its
+    ///   result.
     /// - `dx`: `[rows × inputs]`, overwritten; none if it is not needed.
     pub fn backward(
         &self,

@@ -1,8 +1,9 @@
 //! Arithmetic that gives the same bits on every machine: a fixed order of summation, separate
 //! multiply and add, and no function of the platform. Everything that learns uses it.
 //!
-//! The kernels run on vector instructions, which need `unsafe`. A kernel is written once over `Lanes`
-//! and called through `dispatch!`, which picks the widest instructions that this machine has.
+//! The kernels run on vector instructions, which need `unsafe`. A kernel is written once over
+//! `Lanes` and called through `dispatch!`, which picks the widest instructions that this machine
+//! has.
 
 #[allow(unsafe_code, reason = "its kernel runs on vector instructions")]
 mod adam;

@@ -3,8 +3,8 @@ use crate::ids::Digest;
 /// Random numbers from a seed: xoshiro256++ on 256 bits of state. The same seed gives the same
 /// numbers in every version.
 ///
-/// Own code rather than a package: a package may change its numbers in an upgrade, and every trained
-/// mind would change with it.
+/// Own code rather than a package: a package may change its numbers in an upgrade, and every
+/// trained mind would change with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rng {
     state: [u64; 4],

@@ -89,8 +89,8 @@ unsafe fn square_body<L: Lanes>(a: *const f32, b: *const f32, count: usize, sums
 /// Adds `term(at)` for `at = 0, WIDTH, 2·WIDTH, … < count` to the partial sums.
 ///
 /// # Safety
-/// The machine has the instruction set of `L`. `count` is a multiple of [`STRIPES`], which is one of
-/// `L::WIDTH`; `sums` is valid for writes of [`STRIPES`] numbers.
+/// The machine has the instruction set of `L`. `count` is a multiple of [`STRIPES`], which is one
+/// of `L::WIDTH`; `sums` is valid for writes of [`STRIPES`] numbers.
 #[inline(always)]
 unsafe fn add_up<L: Lanes>(count: usize, sums: *mut f32, term: impl Fn(usize) -> L::Vector) {
     // SAFETY: the operations need the instruction set alone. The stores go to `vectors · WIDTH =

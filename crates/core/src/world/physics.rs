@@ -37,9 +37,9 @@ pub trait World: Send + Sync + 'static {
     /// changes the scene.
     ///
     /// - `task`: breaks ties (a pick-up prefers what is not yet at its goal).
-    /// - `on`: argument `i` is bound to the instance with the name `on[i]` (as [`Thing::name`] shows
-    ///   it). A missing or empty entry leaves the argument free. Entries beyond the arguments are
-    ///   ignored. A world without numbered instances calls [`refuse_other_instances`].
+    /// - `on`: argument `i` is bound to the instance with the name `on[i]` (as [`Thing::name`]
+    ///   shows it). A missing or empty entry leaves the argument free. Entries beyond the arguments
+    ///   are ignored. A world without numbered instances calls [`refuse_other_instances`].
     /// - returns: the names of the instances bound, one per argument (`Mug`, or `Mug 2` when the
     ///   scene has several).
     /// - errors: [`Infeasible`], about the named instance if there is one; the scene is then

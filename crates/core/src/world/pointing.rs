@@ -6,8 +6,8 @@ use crate::language::Symbol;
 pub struct Pointing {
     /// 1-based, as the view numbers them: "mug 2".
     pub number: Option<u32>,
-    /// 1-based, of "the second mug". Where there is only one such thing and it cannot be carried, as
-    /// in "the second shelf", the word may count parts of it and chooses nothing.
+    /// 1-based, of "the second mug". Where there is only one such thing and it cannot be carried,
+    /// as in "the second shelf", the word may count parts of it and chooses nothing.
     pub ordinal: Option<u32>,
     /// How to choose where the scene does not tell. If true, a state word of which the scene says
     /// nothing fits no thing, and a place chooses even where there is only one thing of the type.
@@ -22,8 +22,8 @@ pub struct Pointing {
     pub place: Option<Vec<Symbol>>,
     /// "the mug here": what the robot can reach without walking.
     pub here: bool,
-    /// Names of the instances that the robot handled, newest first, of any type. "other" leaves them
-    /// out, and "same" means the newest. Names that are not in the scene are ignored.
+    /// Names of the instances that the robot handled, newest first, of any type. "other" leaves
+    /// them out, and "same" means the newest. Names that are not in the scene are ignored.
     pub handled: Vec<String>,
     /// "the other mug", "another mug".
     pub other: bool,

@@ -49,8 +49,8 @@ pub trait Words: World {
     fn is_on(&self, scene: &Self::Scene, step: &Step) -> bool;
 
     /// Whether a word names a state, and all things of the type are in the opposite one: "the clean
-    /// mug" where all mugs are dirty. False for a word that names no state, without such a thing, and
-    /// where nothing is known of one of them.
+    /// mug" where all mugs are dirty. False for a word that names no state, without such a thing,
+    /// and where nothing is known of one of them.
     fn unlike(&self, scene: &Self::Scene, kind: &Symbol, word: &str) -> bool;
 
     /// The instance of a type that words choose, by the name that [`Thing::name`] shows: the

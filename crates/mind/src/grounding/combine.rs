@@ -109,8 +109,8 @@ pub enum Verdict {
 }
 
 /// All combinations of the clauses' offers. Each is filled and run on a copy of the scene (paper,
-/// section 3.1.3). A clause is filled in the scene after the clauses before it, so "it" means what is
-/// then in the hand.
+/// section 3.1.3). A clause is filled in the scene after the clauses before it, so "it" means what
+/// is then in the hand.
 ///
 /// - returns: at most [`COMBINATIONS_MAX`], in the order of the offers, the last clause's varying
 ///   fastest.

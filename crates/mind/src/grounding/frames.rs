@@ -11,8 +11,8 @@ use crate::language::{WordLists, is_mark};
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frames {
-    /// At the beginning of an utterance: "could you please", "robot", "ok". Phrases of several words
-    /// also at the beginning of a later clause.
+    /// At the beginning of an utterance: "could you please", "robot", "ok". Phrases of several
+    /// words also at the beginning of a later clause.
     pub openers: BTreeSet<String>,
     /// At the beginning, before a verb in -ing: "would you mind".
     pub gerunds: BTreeSet<String>,
@@ -110,7 +110,7 @@ impl Frames {
         next.is_some_and(|next| self.unless_before.contains(next))
     }
 
-    /// "Alfred, open the fridge": one word that nobody knows before a comma.
+    /// "Alfred, open the fridge": one unknown word before a comma.
     fn address(
         &self,
         framed: &mut Framed,

@@ -12,7 +12,7 @@ pub struct Moment<'a, D: World> {
     pub task: &'a D::Task,
     /// The type named last: what "it" means while the hand is empty.
     pub mentioned: Option<&'a Symbol>,
-    /// The names of the things acted on before in the episode, newest first; a name may be there twice.
-    /// "The other one" excludes them, and "the same one" means the newest.
+    /// The names of the things acted on before in the episode, newest first; a name may be there
+    /// twice. "The other one" excludes them, and "the same one" means the newest.
     pub handled: &'a [String],
 }

@@ -148,8 +148,8 @@ impl Moods {
         framed.tokens.truncate(mark);
     }
 
-    /// Takes away that the last of several clauses is to be done last: "wash the mug and put it back
-    /// when you are done". Said of a single request it is a condition, and stays.
+    /// Takes away that the last of several clauses is to be done last: "wash the mug and put it
+    /// back when you are done". Said of a single request it is a condition, and stays.
     pub(super) fn strip_order(&self, framed: &mut Framed, lists: &WordLists) {
         let marks = framed.tokens.iter().rev().take_while(|token| is_mark(token)).count();
         let end = framed.tokens.len() - marks;
@@ -191,7 +191,8 @@ impl Moods {
         {
             return Some(first.to_owned());
         }
-        // "Open the fridge, will you?" was asked politely; of a bare sentence nobody knows.
+        // "Open the fridge, will you?" is a polite request. Without the courtesy, a question mark
+        // makes it a question.
         let polite = !framed.frames.is_empty();
         (text.contains('?') && !polite).then(|| "?".to_owned())
     }
@@ -223,7 +224,7 @@ impl Moods {
                 return None;
             }
             let determined = at > 0 && lists.determiners.contains(tokens[at - 1]);
-            // Nobody asks for something with an article first.
+            // A request does not begin with an article.
             let named_first = lists.determiners.contains(first);
             if at > 0 && is_verb(token) && !gerund && !determined && !is_past(token) && !named_first
             {

@@ -27,8 +27,8 @@ pub struct RerankerSettings {
 
 /// Scores ground programs in a scene. A score depends on the utterance (word vectors and positions,
 /// transformed and summed), on the state features, and on the program (learned vectors of its
-/// operators and arguments with their positions, transformed and summed). Scores can only be compared
-/// with each other. Source: the paper, section 3.1.3.
+/// operators and arguments with their positions, transformed and summed). Scores can only be
+/// compared with each other. Source: the paper, section 3.1.3.
 #[derive(Debug, Clone)]
 pub struct Reranker {
     words: &'static WordTable,

@@ -10,8 +10,8 @@ pub struct Referents {
     pub last: Option<Symbol>,
 }
 
-/// Finds what mentions mean in a scene (paper, section 3.1.1): a name means the type with the closest
-/// instance; a pronoun means what the robot holds, else what was named last.
+/// Finds what mentions mean in a scene (paper, section 3.1.1): a name means the type with the
+/// closest instance; a pronoun means what the robot holds, else what was named last.
 ///
 /// - `edition`: of the words that the mentions were found with.
 /// - `before`: what was named last before this clause.

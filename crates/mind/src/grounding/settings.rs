@@ -15,13 +15,13 @@ pub struct Abstraction {
     pub adjectives: bool,
     /// Of names in a row, keep the last one: "the desk lamp table".
     pub compounds: bool,
-    /// Also try the utterance without `from the <obj>`, because the place of a thing is often not an
-    /// argument.
+    /// Also try the utterance without `from the <obj>`, because the place of a thing is often not
+    /// an argument.
     pub locations: bool,
     /// Keep the word of a typed fixture beside its slot: `<obj=sink>`.
     pub fixtures: bool,
-    /// Read a word of five letters or more that is in no table as the name that differs from it by one
-    /// letter.
+    /// Read a word of five letters or more that is in no table as the name that differs from it by
+    /// one letter.
     pub spelling: bool,
     /// Where an utterance is cut.
     pub split: Split,
@@ -66,8 +66,8 @@ pub enum Split {
 pub struct Execution {
     /// "turn off" what is off is impossible, with that reason.
     pub polarity: bool,
-    /// When a step fails because one other step is missing, and the world names that step (going there
-    /// first), carry the other one out before it.
+    /// When a step fails because one other step is missing, and the world names that step (going
+    /// there first), carry the other one out before it.
     pub approach: bool,
     /// Decline several primitives in one utterance that only make sense for a purpose that was not
     /// named: put something somewhere, then turn something on.
@@ -79,8 +79,8 @@ pub struct Execution {
     /// Verbs of carrying take the thing along, and do not only walk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carrying: Option<Carrying>,
-    /// When the thing of the likeliest kind is here but cannot be used, do not take another kind with
-    /// the same name.
+    /// When the thing of the likeliest kind is here but cannot be used, do not take another kind
+    /// with the same name.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kinds: bool,
     /// Skip steps of a lesson whose effect holds already.
@@ -95,11 +95,11 @@ pub struct Execution {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accounting {
-    /// Nouns that need no use, because they name no thing of their own: "the DOOR of the fridge", "the
-    /// other SIDE".
+    /// Nouns that need no use, because they name no thing of their own: "the DOOR of the fridge",
+    /// "the other SIDE".
     pub harmless: BTreeSet<String>,
-    /// Such nouns that need no use in a phrase of place only: "on the LID of the toilet", "on the top
-    /// SHELF" of a fridge that was just opened.
+    /// Such nouns that need no use in a phrase of place only: "on the LID of the toilet", "on the
+    /// top SHELF" of a fridge that was just opened.
     pub parts: BTreeSet<String>,
     /// Words that ask for more than switching: "turn the lamp UP", "RED".
     pub degrees: BTreeSet<String>,
@@ -108,8 +108,9 @@ pub struct Accounting {
     pub looking: BTreeSet<String>,
     /// Words before that light: "BY the lamp".
     pub lighting: BTreeSet<String>,
-    /// Words for the state that a thing is to have, in sets that exclude each other. A lesson with a
-    /// word of one set ("a warm mug") does not answer a request with a word of another ("a cold bowl").
+    /// Words for the state that a thing is to have, in sets that exclude each other. A lesson with
+    /// a word of one set ("a warm mug") does not answer a request with a word of another ("a cold
+    /// bowl").
     pub states: Vec<BTreeSet<String>>,
 }
 

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::names::one_slip_apart;
 use crate::language::{WordLists, is_mark};
 
-/// Other words for what seeds say ("grasp" for "pick up"), at the beginning of a clause. A phrase with
-/// an ellipsis has its second part at the end of the clause: "shut … off".
+/// Other words for what seeds say ("grasp" for "pick up"), at the beginning of a clause. A phrase
+/// with an ellipsis has its second part at the end of the clause: "shut … off".
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Verbs(BTreeMap<String, String>);

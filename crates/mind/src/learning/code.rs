@@ -6,9 +6,9 @@ use crate::numerics::NumericsVersion;
 /// Tests compare the code with it.
 const PINS: &str = include_str!("../../data/pins.txt");
 
-/// Names the behaviour of this code: BLAKE3 over the version of the arithmetic, the form of minds, and
-/// the pinned digests of known minds and states. A change of one bit in any of them fails a test until
-/// its pin is changed, and a changed pin changes this digest.
+/// Names the behaviour of this code: BLAKE3 over the version of the arithmetic, the form of minds,
+/// and the pinned digests of known minds and states. A change of one bit in any of them fails a
+/// test until its pin is changed, and a changed pin changes this digest.
 pub fn code_digest() -> Digest {
     let (arithmetic, minds) = (NumericsVersion::CURRENT.0, Bundle::VERSION);
     Digest::of(

@@ -8,9 +8,9 @@ use crate::numerics::Rng;
 use crate::parser::SemanticParser;
 use crate::world::{Edition, Features, Words, World};
 
-/// The history that the reranker learns from. Each lesson is parsed again by the new parser at its own
-/// moment. Each seed is added, with things of a lesson's scene in its slots, so that a few lessons do
-/// not make the reranker forget the primitives.
+/// The history that the reranker learns from. Each lesson is parsed again by the new parser at its
+/// own moment. Each seed is added, with things of a lesson's scene in its slots, so that a few
+/// lessons do not make the reranker forget the primitives.
 ///
 /// - `mind`: the mind so far, without a reranker.
 pub(super) fn history<D: Words + Features>(
@@ -42,8 +42,8 @@ fn taught<D: Words + Features>(
     choice(lesson.utterance.tokens(), &moment, programs, &lesson.program)
 }
 
-/// A seed at the moment of a lesson, about things of that scene. Whether it would run does not matter:
-/// the words alone tell PICKUP from OPEN.
+/// A seed at the moment of a lesson, about things of that scene. Whether it would run does not
+/// matter: the words alone tell PICKUP from OPEN.
 fn seeded<D: Words + Features>(
     domain: &D,
     mind: &Mind,

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::language::{Program, Symbol, Utterance};
 
-/// One taught decomposition, with everything that its lifting depends on. `S` is a world's scene, `T`
-/// its task.
+/// One taught decomposition, with everything that its lifting depends on. `S` is a world's scene,
+/// `T` its task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lesson<S, T> {
     /// What was said.

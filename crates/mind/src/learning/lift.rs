@@ -19,7 +19,8 @@ pub fn lift<D: Words>(domain: &D, recipe: &Recipe, lesson: &Lesson<D::Scene, D::
         Abstractor::new(domain.lexicon(settings.words.edition), &settings.abstraction, &known);
     let whole = abstractor.read(&lesson.utterance).whole();
     let lifted = lift_clause(domain, recipe, lesson, &whole);
-    // "from the <obj>" is dropped only if the program does not need it. Then it was not an argument.
+    // "from the <obj>" is dropped only if the program does not need it. Then it was not an
+    // argument.
     let shorter = settings.abstraction.locations.then(|| without_locations(&whole)).flatten();
     let shorter = shorter.map(|clause| (lift_clause(domain, recipe, lesson, &clause), clause));
     match shorter {

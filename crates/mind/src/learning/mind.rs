@@ -64,8 +64,8 @@ impl Mind {
 
     /// The mind that [`Mind::to_bytes`] wrote, with the same digest.
     ///
-    /// - errors: bytes that are not a mind, of another version, of another recipe or other seeds, or
-    ///   whose parts do not fit together. Never panics, whatever the bytes.
+    /// - errors: bytes that are not a mind, of another version, of another recipe or other seeds,
+    ///   or whose parts do not fit together. Never panics, whatever the bytes.
     pub fn from_bytes<D: Words + Features>(
         domain: &D,
         recipe: &Recipe,
@@ -111,8 +111,8 @@ impl Mind {
         self.interpreter(&known).interpret(&moment, utterance)
     }
 
-    /// [`Mind::interpret`] with another threshold than the mind's own. Weights, exemplars and reranker
-    /// stay as they are. For questions about the past; no user is answered with it.
+    /// [`Mind::interpret`] with another threshold than the mind's own. Weights, exemplars and
+    /// reranker stay as they are. For questions about the past; no user is answered with it.
     ///
     /// - `threshold`: in the unit of the parser's distances.
     /// - returns: none when the parser has no threshold.

@@ -9,13 +9,13 @@ use crate::limits::LESSONS_MAX;
 use crate::parser::SemanticParser;
 use crate::world::{Features, Words};
 
-/// Trains a mind. Seeds and lifted lessons become exemplars. The parser is trained on these, with its
-/// threshold. Then the whole history is parsed again, and the reranker learns from it (paper, section
-/// 3.3).
+/// Trains a mind. Seeds and lifted lessons become exemplars. The parser is trained on these, with
+/// its threshold. Then the whole history is parsed again, and the reranker learns from it (paper,
+/// section 3.3).
 ///
 /// A pure function: the training seed comes from the recipe's digest alone, so the same recipe and
-/// lessons give the same mind, bit for bit, on every machine. Without lessons it is the base mind, with
-/// which every person starts.
+/// lessons give the same mind, bit for bit, on every machine. Without lessons it is the base mind,
+/// with which every person starts.
 ///
 /// - errors: too many lessons, a training that diverges, or a seed that no longer gets its own
 ///   program. The previous mind is then the one to keep.

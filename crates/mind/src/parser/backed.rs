@@ -1,8 +1,8 @@
 use super::{GrammarParser, Parse, SemanticParser, Seq2SeqParser};
 use crate::language::Clause;
 
-/// The paper's baseline: the grammar answers first, and where it has nothing the sequence-to-sequence
-/// model answers. Each candidate says which of the two gave it.
+/// The paper's baseline: the grammar answers first, and where it has nothing the
+/// sequence-to-sequence model answers. Each candidate says which of the two gave it.
 #[derive(Debug, Clone)]
 pub struct BackedParser {
     /// Asked first.

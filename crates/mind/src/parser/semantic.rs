@@ -5,8 +5,8 @@ pub trait SemanticParser {
     /// Candidate programs for one clause, all within the parser's own threshold.
     fn parse(&self, clause: &Clause) -> Parse;
 
-    /// The distance of a chain of clauses, from that of its first clauses and that of the next one. The
-    /// larger of the two, unless the parser has a better rule.
+    /// The distance of a chain of clauses, from that of its first clauses and that of the next one.
+    /// The larger of the two, unless the parser has a better rule.
     fn chain(&self, so_far: f32, next: f32) -> f32 {
         so_far.max(next)
     }
@@ -28,8 +28,8 @@ pub struct Parse {
     pub nearest: Vec<Near>,
     /// The largest distance that counts as understood.
     pub threshold: f32,
-    /// How many of the candidates have an exemplar of exactly this lifted form, or are so near that no
-    /// other reading counts. They come first, and the reranker does not choose between them.
+    /// How many of the candidates have an exemplar of exactly this lifted form, or are so near that
+    /// no other reading counts. They come first, and the reranker does not choose between them.
     pub exact: usize,
 }
 
@@ -42,7 +42,8 @@ pub struct Scored {
     pub distance: f32,
     /// The number of the exemplar that it comes from; [`Scored::OF_NONE`] if it comes from none.
     pub number: u32,
-    /// Whether the world chooses which mention fills which slot. If not, slot n is the n-th mention.
+    /// Whether the world chooses which mention fills which slot. If not, slot n is the n-th
+    /// mention.
     pub open: bool,
     /// Which part of the parser gave it, where it has parts.
     pub by: Option<Answerer>,

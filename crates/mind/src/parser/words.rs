@@ -229,9 +229,9 @@ impl WordTable {
 
     /// Writes the word's vector to `out`, `[dims]`.
     ///
-    /// A word that is not in the table gets a vector of typical length, made from its hash: an unknown
-    /// word is far from all others, and equal to itself. It is never zero, which would make the word
-    /// invisible.
+    /// A word that is not in the table gets a vector of typical length, made from its hash: an
+    /// unknown word is far from all others, and equal to itself. It is never zero, which would make
+    /// the word invisible.
     ///
     /// - panics: `out` does not have `dims` numbers.
     pub fn write_vector(&self, word: &str, out: &mut [f32]) {

@@ -4,8 +4,8 @@ use super::ExemplarSettings;
 use super::tokens::Token;
 use crate::parser::WordTable;
 
-/// Utterances made ready for the network: since W(e + p) = We + Wp, each distinct token and each
-/// position is transformed once, however often it occurs.
+/// Utterances prepared for the network. Because W(e + p) = We + Wp, each distinct token and each
+/// position is transformed only once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Batch {
     /// Fixed part of each distinct token's vector, `[tokens × dims]`.
@@ -23,8 +23,8 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// `sorts`: the sorts that have a trainable vector, sorted. A sort that has none stands for its
-    /// start word.
+    /// `sorts`: the sorts that have a trainable vector, sorted. A sort without one has the vector
+    /// of its start word.
     pub(super) fn new(
         settings: &ExemplarSettings,
         words: &WordTable,

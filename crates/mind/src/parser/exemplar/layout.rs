@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-/// Where each part of the learned parameters lies in their one flat list, so that one optimiser
-/// steps them all and a digest covers them all.
+/// The place of each part of the learned parameters in their flat list. One optimiser steps all of
+/// them, and one digest covers them.
 ///
 /// In order: `transform` `[dims × hidden]`, its bias `[hidden]`; the first layer of the MLP
 /// `[hidden × hidden]`, its bias; the second `[hidden × embedding]`, its bias; a vector of `[dims]`

@@ -54,7 +54,7 @@ pub struct ExemplarSettings {
     pub salt: String,
 }
 
-/// What "a threshold at 90 % precision" means; the paper's text allows each.
+/// What "a threshold at 90 % precision" means. The paper's text allows each of these readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdReading {
@@ -80,8 +80,8 @@ impl Default for ExemplarSettings {
             learning_rate: 3e-3,
             weight_decay: 0.0,
             steps_max: 300,
-            // 0.05 takes four times the steps and understands no more of the recorded sentences: the
-            // network fits the exemplars too closely, and the threshold shrinks.
+            // 0.05 takes four times the steps and understands no more of the recorded sentences:
+            // the network fits the exemplars too closely, and the threshold shrinks.
             stop_loss: 0.07,
             a_start: 5.0,
             b_start: -2.5,
@@ -90,8 +90,8 @@ impl Default for ExemplarSettings {
             normalise: true,
             positions: true,
             word_scale: 1.0,
-            // At 1 the positions are longer than the words and outweigh them: on recorded sentences the
-            // best guess is right for 89 % of primitives against 90 %, and for 25 % of other
+            // At 1 the positions are longer than the words and outweigh them: on recorded sentences
+            // the best guess is right for 89 % of primitives against 90 %, and for 25 % of other
             // people's wordings of a lesson against 40 %.
             position_scale: 0.1,
             slot_words: BTreeMap::from([("obj".to_owned(), "object".to_owned())]),

@@ -1,6 +1,6 @@
-//! The parser of recipe `default`: two judges, each a logistic regression over a few features of words,
-//! with weights learned once from recorded people. Only thresholds are trained per person, so a lesson
-//! is known from the moment it is taught. Source: `docs/features.md`.
+//! The parser of recipe `default`: two judges, each a logistic regression over a few features of
+//! words, with weights learned once from recorded people. Only thresholds are trained per person,
+//! so a lesson is known from the moment it is taught. Source: `docs/features.md`.
 
 mod lesson;
 mod primitive;

@@ -3,11 +3,11 @@ use super::settings::PrimitiveWeights;
 use crate::language::{Clause, Exemplar, Habits, LiftedArg, Symbol, Word};
 use crate::numerics::{dot, ln};
 
-/// Smoothing of the counts, and how many words a clause may have that nobody used.
+/// Smoothing of the counts, and the number of words outside the recordings that it allows for.
 const SMOOTHING: f32 = 0.3;
 const VOCABULARY: f32 = 20.0;
 
-/// How likely a clause means each of a domain's primitives.
+/// Judges how likely a clause means each primitive of a world.
 #[derive(Debug, Clone)]
 pub(super) struct PrimitiveJudge {
     pub operators: Vec<Operator>,
@@ -78,7 +78,7 @@ impl PrimitiveJudge {
         words: &[Word],
         sentence: &Sentence,
     ) -> Vec<Judged> {
-        // "As near as the nearest of the others" needs others.
+        // The features compare an operator with the others, so there must be others.
         if self.operators.len() < 2 || sentence.items.is_empty() {
             return Vec::new();
         }

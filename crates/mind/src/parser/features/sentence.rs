@@ -10,7 +10,7 @@ const SIF: f32 = 1e-3;
 const PARTICLE_WEIGHT: f32 = 0.25;
 const FIXTURE_WEIGHT: f32 = 0.4;
 const OBJECT_WEIGHT: f32 = 0.15;
-/// The word whose vector stands for a thing of which nothing but its slot is known.
+/// The word whose vector is used for a slot without a fixture.
 const OBJECT: &str = "object";
 /// A word is new when it stands in a smaller share of simple clauses than this.
 const RARE: f64 = 0.01;
@@ -52,7 +52,7 @@ pub(super) struct Item {
     pub vector: Vec<f32>,
 }
 
-/// What the judges know of an utterance: its lifted words alone, no scene.
+/// What the judges use of an utterance: its lifted words, and nothing of the scene.
 #[derive(Debug, Clone)]
 pub(super) struct Sentence {
     pub items: Vec<Item>,
@@ -150,7 +150,8 @@ impl Knowledge {
         if let Some(verb) = verb.filter(|verb| !verb.particle.is_empty()) {
             found.insert(format!("V:{base}_{}", verb.particle));
         }
-        // "take it TO", "take it FROM": the first function word behind a mention tells verbs apart.
+        // "take it TO", "take it FROM": the first function word after a mention distinguishes uses
+        // of a verb.
         let mut behind_mention = false;
         for (place, word) in words.iter().enumerate() {
             match word {

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FeaturesSettings {
-    /// The smallest threshold for primitives, as a probability. Each training calibrates the threshold
-    /// between this and the next field.
+    /// The smallest threshold for primitives, as a probability. Each training calibrates the
+    /// threshold between this and the next field.
     pub threshold_min: f32,
     /// The largest threshold for primitives, as a probability.
     pub threshold_max: f32,
@@ -22,7 +22,8 @@ pub struct FeaturesSettings {
     /// Release 0.1 did not have it, and its recipes keep their digest without it.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub unread: f32,
-    /// Whether the own words of a seed keep their meaning for every fixture: "turn off the microwave".
+    /// Whether the own words of a seed keep their meaning for every fixture: "turn off the
+    /// microwave".
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub seeds_of_any_fixture: bool,
     /// Of the judge of primitives.
@@ -65,8 +66,8 @@ pub struct PrimitiveWeights {
 pub struct LessonSettings {
     /// For a lesson that begins with what is in the hand: one request.
     pub request: LessonWeights,
-    /// For a lesson that fetches first: a whole task, in which a fixture may only be the place where it
-    /// ends.
+    /// For a lesson that fetches first: a whole task, in which a fixture may only be the place
+    /// where it ends.
     pub task: LessonWeights,
 }
 

@@ -1,5 +1,5 @@
-//! A hand-written grammar. It answers exactly the sentences it was written for, and no lesson changes
-//! it. It is the first half of the paper's baseline (section 4).
+//! A hand-written grammar. It answers exactly the sentences it was written for, and no lesson
+//! changes it. It is the first half of the paper's baseline (section 4).
 
 mod rules;
 mod settings;

@@ -16,8 +16,8 @@ pub struct GrammarSettings {
     /// Words that are skipped everywhere.
     #[serde(default)]
     pub silent: BTreeSet<String>,
-    /// Classes of phrases that may replace each other, likeliest first. With an empty phrase, the class
-    /// may be left out.
+    /// Classes of phrases that may replace each other, likeliest first. With an empty phrase, the
+    /// class may be left out.
     pub classes: BTreeMap<String, Vec<String>>,
     /// The requests with their meanings. If several fit, the first counts.
     pub requests: Vec<(String, LiftedProgram)>,
@@ -26,8 +26,8 @@ pub struct GrammarSettings {
 impl GrammarSettings {
     /// Checks all patterns.
     ///
-    /// - errors: field and sentence: a pattern with an unknown class, a class that begins with itself,
-    ///   or a program with an argument that its request does not have.
+    /// - errors: field and sentence: a pattern with an unknown class, a class that begins with
+    ///   itself, or a program with an argument that its request does not have.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
         Rules::compile(self).map(|_| ())
     }

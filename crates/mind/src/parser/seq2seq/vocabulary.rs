@@ -4,18 +4,18 @@ use crate::language::{
     Exemplar, LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Signature, Symbol, Word,
 };
 
-/// Slots that the decoder tells apart when it is told its last token; it copies any.
+/// How many slots the decoder's input tells apart. It can copy more.
 const SLOTS_TOLD: usize = 4;
 
-/// The tokens of programs. Numbers of those that can be written: operators, then the end, then
-/// constants. A slot is never written, only copied from where it stands in the utterance.
+/// The tokens of programs. Those that can be written have numbers: operators, then the end, then
+/// constants. A slot is never written; it is copied from its place in the utterance.
 #[derive(Debug, Clone)]
 pub(super) struct Vocabulary {
     /// Each operator and the sorts of its arguments.
     operators: Vec<(Symbol, Vec<Symbol>)>,
-    /// What programs name beside slots: types, `<held>`.
+    /// The arguments that are not slots: types, `<held>`.
     constants: Vec<LiftedArg>,
-    /// Steps of the longest program that was shown; none longer is written.
+    /// Steps of the longest program in training. No longer one is written.
     pub steps_max: usize,
 }
 
@@ -54,7 +54,7 @@ impl Vocabulary {
         self.operators.len() + 1 + self.constants.len()
     }
 
-    /// How many tokens the decoder can be told.
+    /// How many tokens the decoder's input can have.
     pub(super) fn tokens(&self) -> usize {
         self.writes() + SLOTS_TOLD
     }
@@ -63,7 +63,7 @@ impl Vocabulary {
         self.operators.len()
     }
 
-    /// The token that the decoder is told after a choice.
+    /// The input of the decoder after a choice.
     pub(super) fn told(&self, choice: Choice) -> usize {
         match choice {
             Choice::Write(token) => token,
@@ -139,7 +139,7 @@ impl Vocabulary {
         match (expected, choice) {
             (Expected::Argument { operator, place }, _) => next(operator, place + 1),
             (Expected::Step { .. }, Choice::Write(token)) if token < self.end() => next(token, 0),
-            // The end; nothing is expected any more.
+            // After the end, nothing is expected.
             (Expected::Step { .. }, _) => expected,
         }
     }
