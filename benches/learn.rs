@@ -10,7 +10,7 @@ use apprentice::grounding::Moment;
 use apprentice::language::Utterance;
 use apprentice::learning::{Recipe, train};
 use apprentice::world::household::Household;
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
 /// Seeds of the household. The other examples are lessons.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use apprentice::language::{Program, Utterance};
 use apprentice::learning::Lesson;
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 
 /// `count` lessons with different utterances of our own, each for one of four programs.
 pub fn lessons(domain: &Household, count: usize) -> Vec<Lesson<Scene, Task>> {

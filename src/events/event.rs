@@ -1,9 +1,9 @@
-use apprentice_core::outcomes::{Ending, Report};
+use apprentice_core::outcomes::Ending;
 use serde::{Deserialize, Serialize};
 
 use super::TenantEvent;
 use crate::ids::{Digest, Seq, UserId};
-use crate::language::{Answer, Document, Program, Utterance};
+use crate::language::{Answer, Document, Program, Report, Utterance};
 
 /// A fact of one person's life with the robot. Domain-neutral; what a domain knows travels inside
 /// [`Document`] and [`Program`].

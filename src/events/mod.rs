@@ -7,7 +7,8 @@ mod tenant;
 mod upcast;
 
 pub use apprentice_core::header::{Header, HeaderError, commitment};
-pub use apprentice_core::outcomes::{Ending, Report};
+pub use apprentice_core::language::Report;
+pub use apprentice_core::outcomes::Ending;
 pub use apprentice_core::tenants::{PersonErased, Quotas, Role};
 
 pub use codec::{DecodeError, decode, encode};

@@ -9,6 +9,7 @@ mod gateway;
 mod lock;
 mod outbox;
 mod passes;
+#[allow(unsafe_code, reason = "it calls functions of libzmq")]
 mod raw;
 mod rights;
 mod unsent;

@@ -9,7 +9,7 @@ use super::evidence::{SegmentError, check_segment, newest_checkpoint};
 use super::origins::mind_origin;
 use super::repropose::{self, Verdict};
 use super::{Difference, erasures};
-use crate::events::{Event, Record, Report, RetrainCompleted, SegmentClosed, TenantEvent, Times};
+use crate::events::{Event, Record, RetrainCompleted, SegmentClosed, TenantEvent, Times};
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
@@ -334,11 +334,10 @@ impl<'a, D: Domain> Auditor<'a, D> {
                         .map_err(|error| error.to_string()),
                 };
                 if let Ok(mind) = &trained {
-                    let learning::Report { exemplars, threshold, figures } = mind.report().clone();
                     let today = Event::RetrainCompleted(RetrainCompleted {
                         recipe: recipe.digest(),
                         mind: mind.digest(),
-                        report: Report { exemplars, threshold, figures },
+                        report: mind.report().clone(),
                         // Other code may have trained it: the question is whether this one agrees.
                         code: event.code,
                     });

@@ -14,7 +14,7 @@ use crate::ids::Seq;
 use crate::invariants::Invariant;
 use crate::language::{Outcome, Program};
 use crate::learning::Lesson;
-use crate::world::Domain;
+use crate::world::World;
 
 /// Binary and log disagree about the past. Loud, and never healed silently.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -39,7 +39,7 @@ impl Divergence {
 /// Applies one record to the state.
 ///
 /// - errors: [`Divergence`]; the state is then not to be used any more.
-pub fn apply<D: Domain>(
+pub fn apply<D: World>(
     domain: &D,
     state: &mut State<D::Scene, D::Task>,
     record: &Record,
@@ -58,7 +58,7 @@ pub fn apply<D: Domain>(
 /// the place in the chain, the time and the request.
 ///
 /// - errors: [`Divergence`]; the state is then not to be used any more.
-pub(super) fn apply_event<D: Domain>(
+pub(super) fn apply_event<D: World>(
     domain: &D,
     state: &mut State<D::Scene, D::Task>,
     seq: Seq,
@@ -98,7 +98,7 @@ pub(super) fn apply_event<D: Domain>(
     Ok(())
 }
 
-fn open<D: Domain>(
+fn open<D: World>(
     domain: &D,
     state: &mut State<D::Scene, D::Task>,
     seq: Seq,
@@ -118,7 +118,7 @@ fn open<D: Domain>(
     Ok(())
 }
 
-fn start<D: Domain>(
+fn start<D: World>(
     domain: &D,
     state: &mut State<D::Scene, D::Task>,
     seq: Seq,
@@ -148,7 +148,7 @@ fn start<D: Domain>(
     Ok(())
 }
 
-fn interpret<D: Domain>(
+fn interpret<D: World>(
     domain: &D,
     state: &mut State<D::Scene, D::Task>,
     seq: Seq,

@@ -19,7 +19,7 @@ use crate::learning::{self, Lesson, Recipe};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
 };
-use crate::world::{Domain, Stage, StageError};
+use crate::world::{Domain, Features, Show, Stage, StageError, Words, World};
 
 /// Why a command leads to no event.
 pub(super) enum Refusal {
@@ -39,13 +39,13 @@ impl From<Rejection> for Refusal {
 /// An event enters through [`Draft::add`] alone, and what one event says of those before it is
 /// read from the state that they led to. So nothing is proposed that the fold refuses: a record
 /// that no fold accepts would lock its user out.
-struct Draft<'a, D: Domain> {
+struct Draft<'a, D: World> {
     session: &'a Session<D>,
     state: State<D::Scene, D::Task>,
     events: Vec<Event>,
 }
 
-impl<D: Domain> Draft<'_, D> {
+impl<D: World> Draft<'_, D> {
     /// - errors: the event does not follow from those before it.
     fn add(&mut self, event: Event) -> Result<(), Refusal> {
         let seq = self.session.state.head.seq + self.events.len() as u64 + 1;
@@ -106,7 +106,7 @@ pub(super) fn decide<D: Domain>(
     Ok(draft.events)
 }
 
-fn open<D: Domain>(
+fn open<D: World>(
     session: &Session<D>,
     user: &UserId,
     recipe_text: &str,
@@ -128,7 +128,7 @@ fn open<D: Domain>(
     }))
 }
 
-fn start<D: Domain>(session: &Session<D>, stage: &Stage) -> Result<Event, Rejection> {
+fn start<D: Show>(session: &Session<D>, stage: &Stage) -> Result<Event, Rejection> {
     let domain = &*session.domain;
     let (scene, task) = set(domain, stage)?;
     if domain.achieved(&scene, &task) {
@@ -149,7 +149,7 @@ fn start<D: Domain>(session: &Session<D>, stage: &Stage) -> Result<Event, Reject
 }
 
 /// The scene and the task that a stage asks for, unless it is longer than is read.
-pub(super) fn set<D: Domain>(domain: &D, stage: &Stage) -> Result<(D::Scene, D::Task), Rejection> {
+pub(super) fn set<D: World>(domain: &D, stage: &Stage) -> Result<(D::Scene, D::Task), Rejection> {
     let found = match stage {
         Stage::Seed { .. } => 0,
         Stage::Task { task, .. } => task.len(),
@@ -161,7 +161,7 @@ pub(super) fn set<D: Domain>(domain: &D, stage: &Stage) -> Result<(D::Scene, D::
     }
 }
 
-fn say<D: Domain>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
+fn say<D: Words + Features>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
     // Of what is said now, `Session::propose` has checked more.
     let utterance = Utterance::recorded(text).map_err(Rejection::from)?;
     let session = draft.session;
@@ -214,7 +214,7 @@ fn end<S, T>(state: &State<S, T>, ending: Ending) -> Event {
     })
 }
 
-fn teach<D: Domain>(
+fn teach<D: Words>(
     draft: &mut Draft<D>,
     explains: Seq,
     actions: &[u32],
@@ -303,7 +303,7 @@ struct Clash {
     lesson: Option<Seq>,
 }
 
-fn clash<D: Domain>(session: &Session<D>, lesson: &Lesson<D::Scene, D::Task>) -> Option<Clash> {
+fn clash<D: Words>(session: &Session<D>, lesson: &Lesson<D::Scene, D::Task>) -> Option<Clash> {
     let domain = &*session.domain;
     let new = learning::lift(domain, session.recipe(), lesson);
     let seeds = domain.seeds().exemplars.iter().map(|seed| (seed.clone(), None));
@@ -319,21 +319,21 @@ fn clash<D: Domain>(session: &Session<D>, lesson: &Lesson<D::Scene, D::Task>) ->
     Some(Clash { utterance: old.utterance, program: old.program, lesson })
 }
 
-fn forget<D: Domain>(session: &Session<D>, lesson: Seq) -> Result<Event, Rejection> {
+fn forget<D: World>(session: &Session<D>, lesson: Seq) -> Result<Event, Rejection> {
     let live = session.state.lessons.iter().find(|live| live.seq == lesson);
     let live = live.ok_or(Rejection::NoSuchLesson { lesson })?;
     Ok(Event::LessonForgotten(LessonForgotten { lesson, utterance: live.lesson.utterance.clone() }))
 }
 
 /// A training on the lessons that are live after the draft.
-fn retrain<D: Domain>(draft: &Draft<D>) -> Event {
+fn retrain<D: World>(draft: &Draft<D>) -> Event {
     Event::RetrainScheduled(RetrainScheduled {
         recipe: draft.session.recipe().digest(),
         lessons: draft.state.lessons.iter().map(|live| live.seq).collect(),
     })
 }
 
-fn finish_retrain<D: Domain>(
+fn finish_retrain<D: World>(
     session: &Session<D>,
     recipe: Digest,
     outcome: &Result<(Digest, Report), String>,

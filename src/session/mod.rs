@@ -29,14 +29,14 @@ use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::invariants::Invariant;
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::store::Durable;
-use crate::world::Domain;
+use crate::world::{Domain, World};
 
 /// One person's session: a state that only records change, and the mind that answers.
 ///
 /// Live operation, recovery, audit and simulation all drive this same type:
 /// `propose` → (the log makes it durable) → `settle`; or `apply` record by record.
 #[derive(Debug, Clone)]
-pub struct Session<D: Domain> {
+pub struct Session<D: World> {
     domain: Arc<D>,
     state: State<D::Scene, D::Task>,
     recipe: Option<Arc<Recipe>>,
@@ -68,63 +68,15 @@ pub struct Turn {
 
 /// Work that the state says is due.
 #[derive(Debug, Clone)]
-pub enum Outstanding<D: Domain> {
+pub enum Outstanding<D: World> {
     /// Train on these lessons and come back with `Command::FinishRetrain`.
     Retrain { recipe: Arc<Recipe>, lessons: Vec<Lesson<D::Scene, D::Task>> },
 }
 
-impl<D: Domain> Session<D> {
+impl<D: World> Session<D> {
     /// A session before its first record.
     pub fn new(domain: Arc<D>) -> Session<D> {
         Session { domain, state: State::default(), recipe: None, mind: None }
-    }
-
-    /// Decides what `command` deserves. Nothing changes. The events of a turn were applied to a copy
-    /// of the state, so [`Session::settle`] will take them.
-    ///
-    /// - `request`: a repeated id gets [`Proposed::Repeat`] (invariant `ExactlyOnce`).
-    /// - `at`: see [`Session::next_at`].
-    /// - errors: a [`Rejection`], which is not remembered.
-    /// - panics: when the mind that the state names was not [installed](Session::install).
-    pub fn propose(
-        &self,
-        command: &Command,
-        request: RequestId,
-        at: Timestamp,
-    ) -> Result<Proposed, Rejection> {
-        self.answer(command, request, at, Command::check_texts)
-    }
-
-    /// Decides a recorded command again, as [`Session::propose`] would have, but without the rule
-    /// for new texts: older versions recorded texts that it refuses.
-    pub fn propose_recorded(
-        &self,
-        command: &Command,
-        request: RequestId,
-        at: Timestamp,
-    ) -> Result<Proposed, Rejection> {
-        self.answer(command, request, at, |_| Ok(()))
-    }
-
-    fn answer(
-        &self,
-        command: &Command,
-        request: RequestId,
-        at: Timestamp,
-        check: impl Fn(&Command) -> Result<(), Rejection>,
-    ) -> Result<Proposed, Rejection> {
-        if let Some(answered) = self.state.requests.find(request) {
-            return Ok(Proposed::Repeat { first: answered.first, last: answered.last });
-        }
-        check(command)?;
-        match decide::decide(self, command) {
-            Ok(events) => {
-                let batch = Batch { request, at, events };
-                Ok(Proposed::Turn(Turn { after: self.head(), batch }))
-            }
-            Err(Refusal::Rejected(rejection)) => Err(rejection),
-            Err(Refusal::Defect(divergence)) => Ok(Proposed::Defect(divergence)),
-        }
     }
 
     /// Makes a durable turn true and says what its person is told.
@@ -232,6 +184,56 @@ impl<D: Domain> Session<D> {
 
     fn mind_digest(&self) -> Digest {
         self.state.mind.expect("SessionOpened names the base mind and is the first record")
+    }
+}
+
+impl<D: Domain> Session<D> {
+    /// Decides what `command` deserves. Nothing changes. The events of a turn were applied to a copy
+    /// of the state, so [`Session::settle`] will take them.
+    ///
+    /// - `request`: a repeated id gets [`Proposed::Repeat`] (invariant `ExactlyOnce`).
+    /// - `at`: see [`Session::next_at`].
+    /// - errors: a [`Rejection`], which is not remembered.
+    /// - panics: when the mind that the state names was not [installed](Session::install).
+    pub fn propose(
+        &self,
+        command: &Command,
+        request: RequestId,
+        at: Timestamp,
+    ) -> Result<Proposed, Rejection> {
+        self.answer(command, request, at, Command::check_texts)
+    }
+
+    /// Decides a recorded command again, as [`Session::propose`] would have, but without the rule
+    /// for new texts: older versions recorded texts that it refuses.
+    pub fn propose_recorded(
+        &self,
+        command: &Command,
+        request: RequestId,
+        at: Timestamp,
+    ) -> Result<Proposed, Rejection> {
+        self.answer(command, request, at, |_| Ok(()))
+    }
+
+    fn answer(
+        &self,
+        command: &Command,
+        request: RequestId,
+        at: Timestamp,
+        check: impl Fn(&Command) -> Result<(), Rejection>,
+    ) -> Result<Proposed, Rejection> {
+        if let Some(answered) = self.state.requests.find(request) {
+            return Ok(Proposed::Repeat { first: answered.first, last: answered.last });
+        }
+        check(command)?;
+        match decide::decide(self, command) {
+            Ok(events) => {
+                let batch = Batch { request, at, events };
+                Ok(Proposed::Turn(Turn { after: self.head(), batch }))
+            }
+            Err(Refusal::Rejected(rejection)) => Err(rejection),
+            Err(Refusal::Defect(divergence)) => Ok(Proposed::Defect(divergence)),
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Command, Rejection, Session, reply_of};
 use crate::client::{OnClash, Reply};
 use crate::events::{Ending, EpisodeStarted, Event, Record};
 use crate::language::{Document, Utterance};
-use crate::world::{Domain, Stage};
+use crate::world::{Stage, World};
 
 /// The command that these records came from, where the records tell: all but the stage of an
 /// episode (a scene file is not recorded as its text), opening, closing and the end of a training.
@@ -53,7 +53,7 @@ fn run(first: u32, last: u32) -> Vec<u32> {
     }
 }
 
-impl<D: Domain> Session<D> {
+impl<D: World> Session<D> {
     /// The reply to `command` under a request id that `records`, all of them, already carry.
     ///
     /// Two commands count as one where the records cannot tell them apart: a `teach` that met no

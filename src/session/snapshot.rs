@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::state::State;
 use super::{Session, parse_recipe};
 use crate::ids::Digest;
-use crate::world::Domain;
+use crate::world::World;
 
-impl<D: Domain> Session<D> {
+impl<D: World> Session<D> {
     /// Goes on from a state that `apply` made; the mind is to be [installed](Session::install)
     /// afterwards.
     pub fn resume(domain: Arc<D>, state: State<D::Scene, D::Task>) -> Session<D> {

@@ -5,15 +5,9 @@ use super::state::Episode;
 use crate::client::{ActionView, KnownExemplar, Status, Teachable};
 use crate::ids::Digest;
 use crate::learning::{Mind, Recipe};
-use crate::world::{Domain, View};
+use crate::world::{Show, View, Words, World};
 
-impl<D: Domain> Session<D> {
-    /// What the robot sees and holds; none before the first episode.
-    pub fn look(&self) -> Option<View> {
-        let episode = self.state.episode.as_ref()?;
-        Some(self.domain.look(&episode.scene))
-    }
-
+impl<D: World> Session<D> {
     /// The exemplars of the present mind, seeds first.
     pub fn known(&self) -> Vec<KnownExemplar> {
         self.mind.as_ref().map(|mind| self.known_to(mind)).unwrap_or_default()
@@ -27,6 +21,32 @@ impl<D: Domain> Session<D> {
         known.collect()
     }
 
+    /// [`Session::known`], as [`Session::status_before`].
+    pub fn known_before(&self, mind: &Mind) -> Vec<KnownExemplar> {
+        self.known_to(mind)
+    }
+}
+
+impl<D: Show> Session<D> {
+    /// What the robot sees and holds; none before the first episode.
+    pub fn look(&self) -> Option<View> {
+        let episode = self.state.episode.as_ref()?;
+        Some(self.domain.look(&episode.scene))
+    }
+
+    fn actions(&self, episode: &Episode<D::Scene, D::Task>) -> Vec<ActionView> {
+        let numbered = episode.actions.iter().zip(1..);
+        numbered
+            .map(|(action, number)| ActionView {
+                number,
+                step: action.step.to_string(),
+                sentence: self.domain.narrate(&action.step, &action.binding),
+            })
+            .collect()
+    }
+}
+
+impl<D: Words + Show> Session<D> {
     /// - panics: before the session was opened.
     pub fn status(&self) -> Status {
         self.status_with(self.recipe(), self.mind_digest())
@@ -38,11 +58,6 @@ impl<D: Domain> Session<D> {
     /// - `recipe`, `mind`: those that new people start with.
     pub fn status_before(&self, recipe: &Recipe, mind: &Mind) -> Status {
         self.status_with(recipe, mind.digest())
-    }
-
-    /// [`Session::known`], as [`Session::status_before`].
-    pub fn known_before(&self, mind: &Mind) -> Vec<KnownExemplar> {
-        self.known_to(mind)
     }
 
     fn status_with(&self, recipe: &Recipe, mind: Digest) -> Status {
@@ -66,17 +81,6 @@ impl<D: Domain> Session<D> {
                 _ => Vec::new(),
             },
         }
-    }
-
-    fn actions(&self, episode: &Episode<D::Scene, D::Task>) -> Vec<ActionView> {
-        let numbered = episode.actions.iter().zip(1..);
-        numbered
-            .map(|(action, number)| ActionView {
-                number,
-                step: action.step.to_string(),
-                sentence: self.domain.narrate(&action.step, &action.binding),
-            })
-            .collect()
     }
 }
 

@@ -21,19 +21,23 @@ fn note(bytes: isize) {
 }
 
 // SAFETY: every call goes to the system's allocator unchanged; counting allocates nothing.
+#[allow(unsafe_code, reason = "an allocator is an unsafe trait")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size() as isize);
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         note(layout.size() as isize);
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
         note(-(layout.size() as isize));
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.dealloc(place, layout) }
     }
 
@@ -41,6 +45,7 @@ unsafe impl GlobalAlloc for Counting {
         // Both exist while one is copied to the other.
         note(size as isize);
         note(-(layout.size() as isize));
+        // SAFETY: the caller keeps the rules of the system's allocator.
         unsafe { System.realloc(place, layout, size) }
     }
 }

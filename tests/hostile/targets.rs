@@ -22,7 +22,7 @@ use apprentice::session::State;
 use apprentice::store::{self, DataKey, FaultPlan, SeededEntropy, Store, Walk, decoders};
 use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 use apprentice_cli::TranscriptFile;
 use apprentice_study::corpus::Corpus;
 

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use apprentice::grounding::Moment;
 use apprentice::language::{Answerer, Exemplar, Outcome, Program, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
-use apprentice::world::Domain;
 use apprentice::world::household::{Household, Scene, Task};
+use apprentice::world::{Words, World};
 use apprentice_study::known_minds::stage;
 
 fn recipe(name: &str) -> Recipe {

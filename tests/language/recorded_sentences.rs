@@ -12,7 +12,7 @@ use apprentice::grounding::Moment;
 use apprentice::language::{Outcome, Program, Step, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::world::household::{Household, Room, Scene, SceneBuilder, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 use serde::Deserialize;
 
 /// For each of the three primitives.

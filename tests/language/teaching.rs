@@ -7,7 +7,7 @@ use apprentice::grounding::Moment;
 use apprentice::language::{Answer, Outcome, Program, Symbol, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::world::household::{Household, Room, Scene, SceneBuilder, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, Words, World};
 
 /// One conversation. What is understood is carried out.
 struct Talk {

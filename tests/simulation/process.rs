@@ -15,7 +15,7 @@ use apprentice::replay::Minds;
 use apprentice::session::Session;
 use apprentice::store::Pending;
 use apprentice::tenancy::{Admissions, Clock};
-use apprentice::world::Domain;
+use apprentice::world::World;
 
 use apprentice_testkit::toy::Bells;
 
@@ -130,7 +130,7 @@ pub struct Job {
     pub generation: u64,
     pub stream: StreamId,
     pub recipe: Arc<Recipe>,
-    pub lessons: Vec<Lesson<<Bells as Domain>::Scene, <Bells as Domain>::Task>>,
+    pub lessons: Vec<Lesson<<Bells as World>::Scene, <Bells as World>::Task>>,
     pub attention: Attention,
 }
 

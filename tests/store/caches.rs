@@ -6,10 +6,10 @@ use std::fs;
 use std::sync::Arc;
 
 use apprentice::client::OnClash;
-use apprentice::events::{Event, Head, Report};
+use apprentice::events::{Event, Head};
 use apprentice::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use apprentice::invariants::Invariant;
-use apprentice::learning::{Mind, Recipe, code_digest, train};
+use apprentice::learning::{Recipe, code_digest, train};
 use apprentice::replay::{
     Minds, RebuildError, Work, keep_mind, keep_snapshot, mind_origin, rebuild, state_origin,
 };
@@ -50,7 +50,7 @@ impl Ada {
             panic!("a training is due")
         };
         let mind = Arc::new(train(&*ada.domain, &recipe, &lessons).unwrap());
-        let outcome = Ok((mind.digest(), measured(&mind)));
+        let outcome = Ok((mind.digest(), mind.report().clone()));
         let finish = Command::FinishRetrain { recipe: recipe.digest(), outcome };
         ada.act(&store, &mut session, &finish);
         session.install(mind.clone());
@@ -89,11 +89,6 @@ impl Ada {
         assert_eq!(session.mind().unwrap().digest(), session.state().mind.unwrap());
         (session, minds.work())
     }
-}
-
-fn measured(mind: &Mind) -> Report {
-    let report = mind.report().clone();
-    Report { exemplars: report.exemplars, threshold: report.threshold, figures: report.figures }
 }
 
 fn stale() -> CacheCounts {
@@ -218,7 +213,7 @@ fn a_mind_that_this_code_trains_differently_is_used_as_it_was_kept() {
     let mind = session.mind().unwrap().clone();
     let lesson: Seq = session.state().lessons[0].seq;
     ada.act(&store, &mut session, &Command::Forget { lesson });
-    let outcome = Ok((mind.digest(), measured(&mind)));
+    let outcome = Ok((mind.digest(), mind.report().clone()));
     let finish = Command::FinishRetrain { recipe: mind.recipe(), outcome };
     ada.act(&store, &mut session, &finish);
     let then = Origin { code: Digest::of(b"other code"), ..mind_origin(mind.recipe()) };

@@ -10,12 +10,12 @@ use crate::machine;
 /// Seconds by stage, for a clean build tree and for a warm one.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Budget {
+pub(crate) struct Budget {
     seconds: BTreeMap<String, u64>,
 }
 
 impl Budget {
-    pub fn load() -> Result<Budget, String> {
+    pub(crate) fn load() -> Result<Budget, String> {
         let path = machine::root().join("xtask/budget.toml");
         let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         toml::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
@@ -23,7 +23,7 @@ impl Budget {
 
     /// - returns: a sentence, when the stage took longer than its budget.
     /// - errors: the stage has no budget.
-    pub fn exceeded(&self, stage: &str, seconds: u64) -> Result<Option<String>, String> {
+    pub(crate) fn exceeded(&self, stage: &str, seconds: u64) -> Result<Option<String>, String> {
         let allowed = self.seconds.get(stage).copied();
         let allowed =
             allowed.ok_or_else(|| format!("stage {stage} has no line in xtask/budget.toml"))?;

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The workspace's folder.
-pub fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().expect("xtask lies in the workspace").to_owned()
 }
 
 /// True if a program runs with these arguments.
-pub fn answers(program: &str, arguments: &[&str]) -> bool {
+pub(crate) fn answers(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);
     command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
@@ -19,12 +19,12 @@ pub fn answers(program: &str, arguments: &[&str]) -> bool {
 /// Runs a command in the workspace's folder.
 ///
 /// - errors: a sentence with the command line and how it ended.
-pub fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
+pub(crate) fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
     run_with(&[], program, arguments)
 }
 
 /// The same as [`run`], with more environment variables.
-pub fn run_with(
+pub(crate) fn run_with(
     environment: &[(&str, &str)],
     program: &str,
     arguments: &[&str],
@@ -50,7 +50,7 @@ fn target() -> PathBuf {
 /// The service in the release build.
 ///
 /// - errors: it does not build.
-pub fn release_binary() -> Result<PathBuf, String> {
+pub(crate) fn release_binary() -> Result<PathBuf, String> {
     let what = ["--quiet", "--package", "apprentice-cli", "--bin", "apprentice"];
     run("cargo", &[&["build", "--release"], &what[..]].concat())?;
     Ok(target().join("release/apprentice"))
@@ -59,14 +59,14 @@ pub fn release_binary() -> Result<PathBuf, String> {
 /// The service without any optimisation.
 ///
 /// - errors: it does not build.
-pub fn unoptimised_binary() -> Result<PathBuf, String> {
+pub(crate) fn unoptimised_binary() -> Result<PathBuf, String> {
     built_otherwise("unoptimised", &["opt-level=0"])
 }
 
 /// The service with our own packages built as in a release.
 ///
 /// - errors: it does not build.
-pub fn optimised_binary() -> Result<PathBuf, String> {
+pub(crate) fn optimised_binary() -> Result<PathBuf, String> {
     built_otherwise(
         "optimised",
         &["opt-level=3", "debug-assertions=false", "overflow-checks=false", "debug=false"],
@@ -108,12 +108,12 @@ fn built_otherwise(name: &str, settings: &[&str]) -> Result<PathBuf, String> {
 }
 
 /// Installs the emulator of other processors unless it is there.
-pub fn qemu() -> Result<(), String> {
+pub(crate) fn qemu() -> Result<(), String> {
     debian("qemu-user", || answers("qemu-x86_64", &["--version"]))
 }
 
 /// A Python with the packages of the wire's example and of the second reader of proofs, in `target/python`.
-pub fn python() -> Result<PathBuf, String> {
+pub(crate) fn python() -> Result<PathBuf, String> {
     let folder = root().join("target/python");
     let python = folder.join("bin/python");
     let path = python.display().to_string();
@@ -140,7 +140,7 @@ fn say(what: &str) {
 ///
 /// - returns: sentences about what could not be installed, if not every machine needs it.
 /// - errors: what could not be installed and is needed.
-pub fn setup() -> Result<Vec<String>, String> {
+pub(crate) fn setup() -> Result<Vec<String>, String> {
     python()?;
     qemu()?;
     cargo_deny()?;
@@ -149,7 +149,7 @@ pub fn setup() -> Result<Vec<String>, String> {
 }
 
 /// Installs a Debian package unless `present` says that it is there.
-pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
+pub(crate) fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
     if present() {
         return Ok(());
     }
@@ -159,14 +159,14 @@ pub fn debian(package: &str, present: impl Fn() -> bool) -> Result<(), String> {
 }
 
 /// The programs that make and mount a file system in a file.
-pub fn disk_tools() -> Result<(), String> {
+pub(crate) fn disk_tools() -> Result<(), String> {
     debian("e2fsprogs", || answers("mkfs.ext4", &["-V"]))?;
     debian("mount", || answers("losetup", &["--version"]))?;
     debian("util-linux", || answers("unshare", &["--version"]))
 }
 
 /// Installs the licence checker unless it is there.
-pub fn cargo_deny() -> Result<(), String> {
+pub(crate) fn cargo_deny() -> Result<(), String> {
     if answers("cargo", &["deny", "--version"]) {
         return Ok(());
     }

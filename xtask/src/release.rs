@@ -8,7 +8,7 @@ use crate::machine::{self, run, run_with};
 
 /// - `short`: leaves out the long runs.
 /// - errors: the first check that failed.
-pub fn check(short: bool) -> Result<(), String> {
+pub(crate) fn check(short: bool) -> Result<(), String> {
     machine::setup()?;
     same_minds()?;
     same_bytes()?;

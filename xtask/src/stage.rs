@@ -31,7 +31,7 @@ const CHECKS: &[Stage] = &[
 /// Runs the checks of `cargo xtask check`.
 ///
 /// - errors: the first that failed.
-pub fn check() -> Result<(), String> {
+pub(crate) fn check() -> Result<(), String> {
     for stage in CHECKS {
         eprintln!("== {}", stage.name);
         (stage.act)()?;
@@ -46,7 +46,7 @@ pub fn check() -> Result<(), String> {
 ///   the code.
 /// - errors: the first stage that failed or, if enforced, exceeded its budget; a stage without a
 ///   budget.
-pub fn run_all(only: &[String], enforce_budget: bool) -> Result<(), String> {
+pub(crate) fn run_all(only: &[String], enforce_budget: bool) -> Result<(), String> {
     let known: Vec<&str> = STAGES.iter().map(|stage| stage.name).collect();
     if let Some(unknown) = only.iter().find(|name| !known.contains(&name.as_str())) {
         return Err(format!("there is no stage {unknown}; known are {}", known.join(", ")));
@@ -122,7 +122,7 @@ fn licences() -> Result<(), String> {
 }
 
 /// Runs the benchmarks.
-pub fn bench(filter: Option<&str>) -> Result<(), String> {
+pub(crate) fn bench(filter: Option<&str>) -> Result<(), String> {
     let mut arguments = vec!["bench"];
     arguments.extend(["--"].iter().filter(|_| filter.is_some()));
     arguments.extend(filter);

@@ -21,27 +21,53 @@ use crate::ids::{Digest, RequestId, Seq, StreamKey, Timestamp};
 /// It can be walked by a tool that knows no event and holds no key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
+    /// The stream that it belongs to.
     pub stream: StreamKey,
+    /// Its place in the stream, from 1.
     pub seq: Seq,
+    /// Microseconds since the epoch.
     pub at: Timestamp,
+    /// The request that it came from.
     pub request: RequestId,
+    /// The digest of the record before it; zero for the first.
     pub prev: Digest,
+    /// See [`commitment()`].
     pub commitment: Digest,
+    /// The number of the event's kind.
     pub kind: u16,
+    /// The version of the body's format.
     pub version: u16,
 }
 
 /// What is wrong with the bytes of a record.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum HeaderError {
+    /// It ends before its header does.
     #[error("the record has {found} bytes, fewer than a header's {}", Header::BYTES)]
-    Short { found: usize },
+    Short {
+        /// Bytes.
+        found: usize,
+    },
+    /// It is no record.
     #[error("the record does not start with the magic APR1")]
     Magic,
+    /// Its body is longer or shorter than its header says.
     #[error("the header says {said} bytes of sealed body, there are {found}")]
-    Length { said: usize, found: usize },
+    Length {
+        /// Bytes, as the header says.
+        said: usize,
+        /// Bytes that are there.
+        found: usize,
+    },
+    /// A bit of it is another one.
     #[error("the record's checksum is {found:08x}, its header says {said:08x}")]
-    Checksum { said: u32, found: u32 },
+    Checksum {
+        /// As the header says.
+        said: u32,
+        /// Of the bytes that are there.
+        found: u32,
+    },
+    /// Numbers start at 1.
     #[error("the record carries the sequence number 0")]
     Seq,
 }
@@ -49,6 +75,7 @@ pub enum HeaderError {
 const MAGIC: [u8; 4] = *b"APR1";
 
 impl Header {
+    /// How many there are.
     pub const BYTES: usize = 128;
 
     /// The header's bytes followed by the sealed body, with length and checksum filled in.

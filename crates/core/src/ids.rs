@@ -15,26 +15,72 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::limits;
 use crate::plain::{self, Hidden};
 
-/// Why a piece of text is no identifier.
+/// Why a text is not an identifier.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum IdError {
+    /// The text is empty.
     #[error("a {what} must not be empty")]
-    Empty { what: &'static str },
+    Empty {
+        /// The kind of identifier: `tenant`, `user`.
+        what: &'static str,
+    },
+    /// The text is too long.
     #[error("a {what} has at most {max} bytes, but this one has {found}")]
-    TooLong { what: &'static str, max: usize, found: usize },
+    TooLong {
+        /// The kind of identifier.
+        what: &'static str,
+        /// Bytes allowed.
+        max: usize,
+        /// Bytes found.
+        found: usize,
+    },
+    /// The text has a character that is never allowed.
     #[error("a {what} may not contain {found:?}; allowed are {allowed}")]
-    Character { what: &'static str, found: char, allowed: &'static str },
+    Character {
+        /// The kind of identifier.
+        what: &'static str,
+        /// The first character that is not allowed.
+        found: char,
+        /// The characters that are allowed, in words.
+        allowed: &'static str,
+    },
+    /// The text has a character that a reader cannot see.
     #[error("a {what}: {hidden}")]
-    Hidden { what: &'static str, hidden: Hidden },
+    Hidden {
+        /// The kind of identifier.
+        what: &'static str,
+        /// The character, and where it stands.
+        hidden: Hidden,
+    },
+    /// The text has white space where none may be.
     #[error(
         "character {place} of a {what} is {found:?}; the only blanks allowed are spaces (U+0020) \
          between words"
     )]
-    Blank { what: &'static str, found: char, place: usize },
+    Blank {
+        /// The kind of identifier.
+        what: &'static str,
+        /// The white space.
+        found: char,
+        /// Counted in characters, from 1.
+        place: usize,
+    },
+    /// The text begins like an option of a command.
     #[error("a {what} may not begin with '-': a command would read it as an option")]
-    Option { what: &'static str },
+    Option {
+        /// The kind of identifier.
+        what: &'static str,
+    },
+    /// The text is not in the form of the identifier.
     #[error("{found:?} is not a {what}: expected {expected}")]
-    Form { what: &'static str, found: String, expected: &'static str },
+    Form {
+        /// The kind of identifier.
+        what: &'static str,
+        /// The text, cut after 80 characters.
+        found: String,
+        /// The form, in words.
+        expected: &'static str,
+    },
 }
 
 /// A lab. Lower-case letters, digits and hyphens, 1 to [`limits::TENANT_BYTES_MAX`] bytes.
@@ -48,6 +94,8 @@ impl TenantId {
         TenantId("local".to_owned())
     }
 
+    /// The tenant with this name.
+    ///
     /// - errors: empty, longer than [`limits::TENANT_BYTES_MAX`], or a character that is not
     ///   `a-z`, `0-9` or `-`: a tenant names files and trees, so it must never carry a path.
     pub fn new(text: &str) -> Result<Self, IdError> {
@@ -61,7 +109,8 @@ impl TenantId {
         }
     }
 
-    /// Whether a new tenant may be called so. Older versions made tenants of more names; those stay.
+    /// Whether a new tenant may have this name. Older versions allowed more names; such tenants
+    /// stay.
     ///
     /// - errors: a leading hyphen.
     pub fn check_new(&self) -> Result<(), IdError> {
@@ -71,6 +120,7 @@ impl TenantId {
         }
     }
 
+    /// The name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -96,13 +146,15 @@ impl fmt::Display for TenantId {
 }
 
 /// A person inside a tenant, as the tenant's gateway names them. A text without control characters;
-/// it appears in no key, head or proof (see [`StreamId`]). Somebody new needs a name that
-/// [`UserId::check_new`] accepts, too.
+/// it appears in no key, head or proof (see [`StreamId`]). A new person's name must also pass
+/// [`UserId::check_new`].
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct UserId(String);
 
 impl UserId {
+    /// The person with this name.
+    ///
     /// - errors: empty, longer than [`limits::USER_BYTES_MAX`], or a control character.
     pub fn new(text: &str) -> Result<Self, IdError> {
         check_length("user", text, limits::USER_BYTES_MAX)?;
@@ -114,8 +166,8 @@ impl UserId {
         }
     }
 
-    /// Whether somebody new may be called so: two names that look the same should be one. Older
-    /// versions recorded people with more names; those stay reachable.
+    /// Whether a new person may have this name: two names that look the same must be one name.
+    /// Older versions allowed more names; people recorded under them stay reachable.
     ///
     /// - errors: a [hidden](plain::check) character; white space at an end; white space other than
     ///   U+0020.
@@ -133,6 +185,7 @@ impl UserId {
         }
     }
 
+    /// The name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -174,10 +227,12 @@ fn check_length(what: &'static str, text: &str, max: usize) -> Result<(), IdErro
 
 /// One person's life in one tenant: the unit of order, of sealing and of replay.
 ///
-/// `key` is a keyed hash of the user name (`store::keys`), so that names stand in no key.
+/// No stream carries the name of its user: `key` is a keyed hash of it (`store::keys`).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StreamId {
+    /// The lab.
     pub tenant: TenantId,
+    /// Which of the lab's streams.
     pub key: StreamKey,
 }
 
@@ -212,9 +267,13 @@ macro_rules! byte_id {
     ($(#[$attribute:meta])* $name:ident, $size:expr, $what:literal, $expected:literal) => {
         $(#[$attribute])*
         #[derive(Clone, Copy, PartialEq, Eq)]
-        pub struct $name(pub [u8; $size]);
+        pub struct $name(
+            /// The bytes.
+            pub [u8; $size],
+        );
 
         impl $name {
+            /// The bytes as lower-case hexadecimal digits.
             pub fn to_hex(&self) -> String {
                 self.0.iter().map(|byte| format!("{byte:02x}")).collect()
             }
@@ -293,9 +352,9 @@ macro_rules! byte_id {
 byte_id!(
     /// The keyed hash that stands for a user name. 16 bytes.
     ///
-    /// It names a stream inside one tenant and no stream among several: every tenant's own stream has
-    /// the same key. So it has no order and no hash, and nothing can be indexed by it alone. Index by
-    /// [`StreamId`], or inside one tenant with [`WithinTenant`].
+    /// It names a stream only together with a tenant: every tenant's own stream has the same key.
+    /// So it has no order and no hash, and no map can be indexed by it alone. Index by
+    /// [`StreamId`], or use [`WithinTenant`] inside one tenant.
     ///
     /// ```compile_fail,E0277
     /// let mut streams = std::collections::BTreeMap::new();
@@ -309,13 +368,15 @@ byte_id!(
     StreamKey, 16, "stream key", "32 hexadecimal digits"
 );
 byte_id!(
-    /// Names one request of one client, for ever: a retry carries the same one. 16 bytes.
+    /// Names one request of one client. A retry carries the same id; no other request ever does.
+    /// 16 bytes.
     #[derive(PartialOrd, Ord, Hash)]
     RequestId, 16, "request id", "32 hexadecimal digits"
 );
 byte_id!(
-    /// The public half of a CURVE key (RFC 26): who a connection is. 32 bytes. Reads and prints as
-    /// 64 hexadecimal digits; ZeroMQ's own form of 40 characters (Z85) is known to `frontends`.
+    /// The public half of a CURVE key (RFC 26): it names the other end of a connection. 32 bytes.
+    /// Reads and prints as 64 hexadecimal digits. `frontends` converts it to ZeroMQ's own form of
+    /// 40 characters (Z85).
     #[derive(PartialOrd, Ord, Hash)]
     PublicKey, 32, "public key", "64 hexadecimal digits"
 );
@@ -331,8 +392,8 @@ byte_id!(
 );
 
 impl StreamKey {
-    /// The tenant's own stream, of what operators did. No name hashes to it but by a chance of one
-    /// in 2^128.
+    /// The tenant's own stream, with what operators did. A user name hashes to it with a
+    /// probability of one in 2^128.
     pub const TENANT: StreamKey = StreamKey([0; 16]);
 }
 
@@ -342,7 +403,7 @@ impl StreamId {
         StreamId { tenant: tenant.clone(), key: StreamKey::TENANT }
     }
 
-    /// Whether this is a tenant's own stream, and nobody's life.
+    /// Whether this is a tenant's own stream, and not a person's.
     pub fn is_tenants(&self) -> bool {
         self.key == StreamKey::TENANT
     }
@@ -352,6 +413,7 @@ impl Digest {
     /// What the first record of a stream names as its predecessor.
     pub const ZERO: Digest = Digest([0; 32]);
 
+    /// The digest of these bytes.
     pub fn of(bytes: &[u8]) -> Digest {
         Digest(*blake3::hash(bytes).as_bytes())
     }
@@ -367,16 +429,22 @@ impl Digest {
 pub struct Seq(NonZeroU64);
 
 impl Seq {
+    /// The place of a stream's first record: 1.
     pub const FIRST: Seq = Seq(NonZeroU64::MIN);
 
+    /// The place with this number; none for 0.
     pub fn new(number: u64) -> Option<Seq> {
         NonZeroU64::new(number).map(Seq)
     }
 
+    /// The number, from 1.
     pub fn get(self) -> u64 {
         self.0.get()
     }
 
+    /// The place after this one.
+    ///
+    /// - panics: after 2^64 - 1 records, which no stream reaches.
     pub fn next(self) -> Seq {
         Seq(self.0.checked_add(1).expect("a stream never reaches 2^64 records"))
     }
@@ -392,25 +460,28 @@ impl fmt::Display for Seq {
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Default,
 )]
-pub struct Timestamp(pub u64);
+pub struct Timestamp(
+    /// Microseconds.
+    pub u64,
+);
 
 impl Timestamp {
-    /// The time of a record that follows on one of this time. Times never run backwards within a
-    /// stream: where the wall clock reads no later than the record before, the time is held, one
-    /// microsecond above that record's.
+    /// The time of the record after one with this time. Times never run backwards within a stream:
+    /// where the wall clock is not later than the record before, the time is *held*, one
+    /// microsecond after that record's.
     pub fn next(self, wall: Timestamp) -> Timestamp {
         wall.max(Timestamp(self.0.saturating_add(1)))
     }
 
-    /// Whether this is a held time, when the batch before has the time `before`: see
-    /// [`Timestamp::next`]. Two batches are never made within one microsecond, so no reading of a
-    /// clock is taken for a held time. Builds before the release of 0.2 held the times of tenants' own
+    /// Whether this is a held time (see [`Timestamp::next`]) when the batch before has the time
+    /// `before`. Two batches are never made within one microsecond, so a reading of the clock is
+    /// never taken for a held time. Builds before the release of 0.2 held the times of tenants' own
     /// streams at `before` itself.
     pub fn is_held(self, before: Timestamp) -> bool {
         self.0 <= before.0.saturating_add(1)
     }
 
-    /// The last moment there is, when the sum would be beyond it.
+    /// The time some seconds later; the last possible time where the sum would be beyond it.
     pub fn plus_seconds(self, seconds: u64) -> Timestamp {
         Timestamp(self.0.saturating_add(seconds.saturating_mul(1_000_000)))
     }

@@ -1,5 +1,5 @@
-//! The words that all of apprentice speaks: ids and limits, utterances, programs and answers,
-//! arithmetic with one order of summation, and what a world must offer. Pure: no clock, no entropy,
+//! The types that all of apprentice uses: ids and limits, utterances, programs and answers,
+//! arithmetic with one order of summation, and the traits of a world. Pure: no clock, no entropy,
 //! no file, no thread.
 
 pub mod fairness;

@@ -1,5 +1,5 @@
-//! Every bound of the service, with its unit and its reason. Related bounds are compared at
-//! compile time at the end of the file. (Invariant `Bounded`.)
+//! Every bound of the service, with its unit and its reason (invariant `Bounded`). The end of the
+//! file compares related bounds at compile time.
 
 /// Bytes of a tenant's name: it is a file name and a tree name.
 pub const TENANT_BYTES_MAX: usize = 64;
@@ -10,7 +10,7 @@ pub const USER_BYTES_MAX: usize = 128;
 pub const UTTERANCE_BYTES_MAX: usize = 2_000;
 /// Words of one utterance.
 pub const UTTERANCE_WORDS_MAX: usize = 150;
-/// Mentions of objects in one utterance; later ones stay plain words.
+/// Mentions of objects in one utterance. Later ones are read as plain words.
 pub const MENTIONS_MAX: usize = 16;
 /// Clauses an utterance is split into.
 pub const CLAUSES_MAX: usize = 8;
@@ -44,11 +44,11 @@ pub const REQUEST_RING: usize = 1_024;
 /// Seconds during which a client retries a request.
 pub const CLIENT_RETRY_S_MAX: u64 = 60;
 
-/// Bytes of one `sled` value. `sled` writes a page above 128 kB to a blob file that it never
-/// syncs, and a page holds up to 20 values: values of 8 kB do become blobs (a test of `store/`
-/// shows it), values of 4 kB cannot. Anything larger is chunked.
+/// Bytes of one `sled` value. `sled` writes a page above 128 kB to a blob file that it never syncs,
+/// and a page holds up to 20 values: values of 8 kB become blobs (a test of `store/` shows it),
+/// values of 4 kB cannot. Larger values are split.
 pub const STORE_VALUE_BYTES_MAX: usize = 4 * 1024;
-/// Bytes that a stream's key file counts as in its lab's quota: a file takes a block of this size.
+/// Bytes by which a stream's key file counts in its lab's quota: a file takes a block of this size.
 pub const KEY_FILE_BYTES: u64 = 4 * 1024;
 /// Bytes of one record's body before sealing.
 pub const RECORD_BYTES_MAX: usize = 4 * 1024 * 1024;
@@ -65,27 +65,27 @@ pub const COMMIT_GROUP_MAX: usize = 512;
 /// Bytes of the batches flushed together; a group ends with the batch that reaches it.
 pub const COMMIT_GROUP_BYTES_MAX: usize = 8 * 1024 * 1024;
 
-/// Seconds a group may take to become durable; then the log counts as hanging and is poisoned, in
-/// time for its clients to find the next process.
+/// Seconds a group may take to become durable. After that, the log counts as hanging and is
+/// poisoned, early enough for its clients to find the next process.
 pub const COMMIT_S_MAX: u64 = 15;
 
 /// Keys that one tenant ever admitted; retired ones are remembered.
 pub const TENANT_KEYS_MAX: usize = 1_024;
-/// Bytes of what an operator writes beside an order: a key's label, a reason.
+/// Bytes of a text that an operator writes with an order: a key's label, a reason.
 pub const LABEL_BYTES_MAX: usize = 200;
-/// Seconds that a retired key may stay good beside its successor: 30 days. Longer ones are made by
-/// retiring the key later.
+/// Seconds for which a retired key may stay valid together with its successor: 30 days. For a
+/// longer overlap, retire the key later.
 pub const OVERLAP_S_MAX: u64 = 30 * 24 * 60 * 60;
-/// Orders waiting for the registrar; then an honest `Busy`.
+/// Orders waiting for the registrar; one more is answered `Busy`.
 pub const REGISTRAR_QUEUE_MAX: usize = 4_096;
 
-/// Messages waiting in one user's mailbox; then an honest `Busy`.
+/// Messages waiting in one user's mailbox; one more is answered `Busy`.
 pub const MAILBOX_MAX: usize = 32;
-/// Requests waiting for one training to end; then an honest `Busy`.
+/// Requests waiting for one training to end; one more is answered `Busy`.
 pub const WAITERS_MAX: usize = 8;
 /// Seconds that one request may wait for a training to end; well below [`CLIENT_RETRY_S_MAX`].
 pub const WAIT_S_MAX: u32 = 30;
-/// Users awake at once; the longest idle one goes to sleep.
+/// Users awake at the same time; for one more, the longest idle one goes to sleep.
 pub const AWAKE_USERS_MAX: usize = 10_000;
 /// Minds kept in memory, over all tenants; a mind has some hundred kilobytes.
 pub const MINDS_IN_MEMORY_MAX: usize = 512;
@@ -95,30 +95,31 @@ pub const TRAIN_QUEUE_MAX: usize = 1_024;
 pub const FRAME_BYTES_MAX: usize = 512 * 1024;
 /// Frames of one wire message, the envelope included.
 pub const FRAMES_MAX: usize = 4;
-/// Requests of one tenant alone that actors have and have not yet answered; several tenants
-/// together have less than twice as many.
+/// Requests of one tenant alone that actors have not answered yet. Several tenants together have
+/// less than twice as many.
 pub const GATEWAY_IN_FLIGHT_MAX: usize = 8_192;
-/// Requests waiting for the directory. It takes whatever all gateways may have in flight.
+/// Requests waiting for the directory: all that the gateways may have in flight.
 pub const DIRECTORY_QUEUE_MAX: usize = 2 * GATEWAY_IN_FLIGHT_MAX;
-/// Places in the log of one tenant alone that wait to be published; then they are left out, and
+/// Places in the log of one tenant alone that wait to be published. More are left out, and
 /// followers fetch them.
 pub const NOTIFICATIONS_WAITING_MAX: usize = 4_096;
-/// Messages of the feed that wait for one subscriber; then it misses some, and fetches them.
+/// Messages of the feed that wait for one subscriber. It misses more, and fetches them.
 pub const FEED_WAITING_MAX: i32 = 512;
 /// Bytes of answers of one tenant alone that wait to leave the process; several tenants together
-/// have less than twice as many. What finds no room is dropped and counted, and asked for again.
+/// have less than twice as many. An answer without room is dropped and counted, and its client asks
+/// again.
 pub const UNSENT_BYTES_MAX: usize = 8 * 1024 * 1024;
-/// Bytes of answers that wait to leave the process for one connection; the first is always taken
-/// that its tenant has room for.
+/// Bytes of answers that wait to leave the process for one connection. The first answer is always
+/// taken if its tenant has room for it.
 pub const UNSENT_CONNECTION_BYTES_MAX: usize = 2 * 1024 * 1024;
 /// Bytes of the feed of one tenant alone that wait to leave the process, as [`UNSENT_BYTES_MAX`];
-/// what finds no room is left out, and followers fetch it.
+/// messages without room are left out, and followers fetch them.
 pub const FEED_UNSENT_BYTES_MAX: usize = 8 * 1024 * 1024;
-/// Bytes of requests of one tenant alone that actors have; then an honest `Busy`.
+/// Bytes of requests of one tenant alone that actors have; one more request is answered `Busy`.
 pub const IN_HAND_BYTES_MAX: usize = 8 * 1024 * 1024;
-/// Messages of one connection that wait to be read by the gateway; then its sender waits.
+/// Messages of one connection that wait to be read by the gateway. With more, the sender waits.
 pub const UNREAD_MAX: i32 = 16;
-/// Seconds after which a network connection is cut that takes nothing of what is sent to it.
+/// Seconds after which a network connection is closed if it takes nothing that is sent to it.
 pub const UNREAD_S_MAX: u32 = 30;
 /// Bytes of the kernel's buffer for what is sent to one network connection.
 pub const SEND_BUFFER_BYTES: i32 = 256 * 1024;
@@ -131,19 +132,20 @@ pub const DOOR_CONNECTIONS_MAX: usize = 128;
 pub const KEY_FOLLOWERS_MAX: usize = 8;
 /// Connections of one tenant alone at the feed, as [`DOOR_CONNECTIONS_MAX`].
 pub const FEED_CONNECTIONS_MAX: usize = 32;
-/// Topics that one key subscribes to; it is then cut off. `libzmq` keeps about 2 kB for each.
+/// Topics that one key subscribes to; with one more it is cut off. `libzmq` keeps about 2 kB for
+/// each.
 pub const TOPICS_MAX: usize = 1_024;
 /// The same for topics that the feed never publishes: they can be long.
 pub const FOREIGN_TOPICS_MAX: usize = 16;
-/// Seconds for which a key is kept from the feed that subscribed to too much.
+/// Seconds for which a key may not use the feed after it subscribed to too many topics.
 pub const CUT_OFF_S: u64 = 600;
-/// Questions about the log that wait, of one tenant alone; then an honest `Busy`.
+/// Questions about the log of one tenant alone that wait; one more is answered `Busy`.
 pub const ARCHIVE_QUEUE_MAX: usize = 64;
 /// Heads of streams in one answer.
 pub const HEADS_IN_REPLY_MAX: usize = 1_000;
 /// Records in one answer.
 pub const RECORDS_IN_REPLY_MAX: usize = 256;
-/// Bytes of records after which an answer ends; its last record may be as large as records are.
+/// Bytes of records after which an answer ends. Its last record may have any allowed size.
 pub const RECORDS_IN_REPLY_BYTES: usize = 256 * 1024;
 /// Nested maps and lists of one wire message; a request needs 4.
 pub const WIRE_DEPTH_MAX: usize = 32;

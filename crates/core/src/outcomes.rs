@@ -1,6 +1,4 @@
-//! How an episode and a training ended. The log and the wire write these in the same form.
-
-use std::collections::BTreeMap;
+//! How an episode ended. The log and the wire write it in the same form.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,16 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
+    /// The goal was reached.
     Achieved,
+    /// The person ended it.
     Abandoned,
-}
-
-/// What a training measured about itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-pub struct Report {
-    /// Seeds and live lessons.
-    pub exemplars: u32,
-    pub threshold: f32,
-    /// Everything else the parser kind reports, by name.
-    pub figures: BTreeMap<String, f64>,
 }

@@ -1,14 +1,15 @@
-//! Which characters can forge what a person reads, in one place: [`check`] refuses them in texts that
-//! come in, [`escape`] shows them in texts that go out.
+//! The characters that can make a text look like another: [`check`] refuses them in texts that come
+//! in, [`escape`] shows them in texts that go out.
 //!
-//! *Hidden* are the characters that cannot be seen, end a line, drive a terminal or turn the order of
-//! others around: control characters (C0, DEL, C1), line and paragraph separators, marks of writing
+//! A *hidden* character cannot be seen, ends a line, controls a terminal or reverses the order of
+//! others: control characters (C0, DEL, C1), line and paragraph separators, marks of writing
 //! direction, characters without width, fillers, annotations, tags and noncharacters.
 //!
-//! Two kinds are needed and hidden only in the wrong place:
+//! Two kinds are needed, and are hidden only in the wrong place:
 //! - joiners (U+200C, U+200D), which hold emoji together and shape Persian and Indic scripts, may
 //!   stand between two visible characters that are not ASCII;
-//! - variation selectors may follow one visible character that is not ASCII, or a digit, `#` or `*`.
+//! - variation selectors may follow one visible character that is not ASCII, or a digit, `#` or
+//!   `*`.
 //!
 //! Every other character is plain, in every script, and neither function changes it.
 
@@ -22,6 +23,7 @@ use std::fmt::Write;
     u32::from(*found)
 )]
 pub struct Hidden {
+    /// The character.
     pub found: char,
     /// Counted in characters, from 1.
     pub place: usize,
@@ -34,15 +36,15 @@ pub fn check(text: &str) -> Result<(), Hidden> {
     first_hidden(text, |_| false)
 }
 
-/// Checks a text of several lines, such as a scene file: line ends and tabs are welcome.
+/// Checks a text of several lines, such as a scene file: line ends and tabs are allowed.
 ///
 /// - errors: the first hidden character.
 pub fn check_lines(text: &str) -> Result<(), Hidden> {
     first_hidden(text, |c| matches!(c, '\n' | '\r' | '\t'))
 }
 
-/// One line as a person may read it: each hidden character is written as `\u{202e}`. The result is
-/// one line, whatever the text held. A plain text stays as it is.
+/// The text as one line that is safe to show: each hidden character is written as `\u{202e}`. A
+/// plain text stays as it is.
 pub fn escape(text: &str) -> Cow<'_, str> {
     escape_but(text, |_| false, rust_form)
 }
@@ -58,8 +60,8 @@ pub fn escape_json(json: &str) -> Cow<'_, str> {
     escape_but(json, |c| matches!(c, '\n' | '\t'), json_form)
 }
 
-/// The text with U+FFFD in the place of each hidden character: as many words and clause marks, and
-/// nothing that [`check`] refuses.
+/// The text with U+FFFD in the place of each hidden character. It has as many words and clause
+/// marks as before, and [`check`] accepts it.
 pub fn replace(text: &str) -> Cow<'_, str> {
     escape_but(text, |_| false, |out, _| out.push('\u{fffd}'))
 }

@@ -1,9 +1,9 @@
 //! Panics on purpose, for the tests that show what a panic costs (`tests/faults/`).
 //!
-//! A release build holds nothing of this: [`point`] is empty there.
+//! In a release build, [`point`] is empty.
 
-/// A place where a test may let the program panic: the environment variable `APPRENTICE_PANIC` is
-/// `NAME:N`, and the N-th time that the point NAME is passed it panics.
+/// A place where a test may let the program panic. With the environment variable
+/// `APPRENTICE_PANIC=NAME:N`, it panics when the point NAME is passed for the N-th time.
 #[cfg(debug_assertions)]
 pub fn point(name: &'static str) {
     use std::sync::OnceLock;
@@ -23,6 +23,7 @@ pub fn point(name: &'static str) {
     }
 }
 
+/// A place where a test may let the program panic; empty in a release build.
 #[cfg(not(debug_assertions))]
 #[inline]
 pub fn point(_: &'static str) {}

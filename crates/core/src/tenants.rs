@@ -41,17 +41,21 @@ pub struct Quotas {
 /// A person's key was destroyed; their records are noise from here on, and stay where they are.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PersonErased {
+    /// The person's stream.
     pub stream: StreamKey,
     /// Where the stream ended.
     pub last: Seq,
+    /// The digest of its last record.
     pub head: Digest,
     /// Ed25519 by the tenant's key, over `tenancy::erasure_statement`.
     pub signature: Signature,
 }
 
 impl Role {
+    /// Every role.
     pub const ALL: [Role; 3] = [Role::Gateway, Role::Operator, Role::Auditor];
 
+    /// As it is written: `gateway`.
     pub fn name(self) -> &'static str {
         match self {
             Role::Gateway => "gateway",

@@ -16,8 +16,8 @@ pub(super) fn remaining(scene: &Scene, task: &Task) -> u32 {
     if achieved(scene, task) {
         return 0;
     }
-    // The rules look at pairs of things; in a scene of hundreds of apples and tables a weak bound
-    // is the better bargain.
+    // The rules look at pairs of things. In a scene with hundreds of apples and tables, a weaker
+    // bound is faster in all.
     let count = |kind: &Kind| scene.of(*kind).count();
     if task.needs().iter().map(count).product::<usize>() > PAIRS_MAX {
         return 1;
@@ -33,7 +33,7 @@ pub(super) fn remaining(scene: &Scene, task: &Task) -> u32 {
         | Goal::Cool { thing, place } => here.treat(task, thing, place),
         Goal::Look { thing, light } => here.look(thing, light),
     };
-    // Every door that stands open now needs a CLOSE beyond those counted above: a microwave or
+    // Every door that is open now needs a CLOSE beyond those counted above: a microwave or
     // fridge that is closed to work is opened again afterwards.
     match task.closed {
         true => goal + here.open_doors(),

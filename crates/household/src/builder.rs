@@ -69,7 +69,7 @@ impl SceneBuilder {
             false => (&self.along_walls, &mut self.walls_used),
         };
         let (x, y) = spots[*used % spots.len()];
-        // A second round stands a little aside, so that no two things are at one spot.
+        // Things of a second round are moved by 25 cm, so that no two are at one spot.
         let aside = 25 * (*used / spots.len()) as i16;
         *used += 1;
         self.stand_kind_at(kind, (x.saturating_add(aside), y.saturating_add(aside)))
@@ -119,7 +119,7 @@ impl SceneBuilder {
             return Err(BuildError(does_not_go(kind, under)));
         }
         self.scene.object_mut(id.0).parent = Some(place.0);
-        // What is in or on it moves along, in whatever order things were put together.
+        // Everything in or on it moves too. Things may have been put together in any order.
         for index in 0..self.scene.objects.len() as Index {
             if let Some(parent) = self.scene.object(index).parent {
                 let spot = spot_on(&self.scene, parent, index);
@@ -130,16 +130,22 @@ impl SceneBuilder {
         Ok(())
     }
 
+    /// Opens it.
+    ///
     /// - errors: it does not open.
     pub fn open(&mut self, id: ObjectId) -> Result<&mut SceneBuilder, BuildError> {
         self.set(id, State::Open, true)
     }
 
+    /// Closes it.
+    ///
     /// - errors: it does not close.
     pub fn close(&mut self, id: ObjectId) -> Result<&mut SceneBuilder, BuildError> {
         self.set(id, State::Open, false)
     }
 
+    /// Turns it on.
+    ///
     /// - errors: it does not turn on.
     pub fn turn_on(&mut self, id: ObjectId) -> Result<&mut SceneBuilder, BuildError> {
         self.set(id, State::On, true)
@@ -167,7 +173,7 @@ impl SceneBuilder {
         Ok(self)
     }
 
-    /// Makes the robot stand at a thing (at what that is in or on).
+    /// Makes the robot stand at a thing, or at the furniture that the thing is in or on.
     pub fn stand_at(&mut self, id: ObjectId) -> &mut SceneBuilder {
         let root = self.scene.root(id.0);
         (self.scene.robot.x, self.scene.robot.y) = self.scene.place(root);
@@ -196,8 +202,7 @@ impl SceneBuilder {
         &self.scene
     }
 
-    /// The scene, with every thing's states brought up to date (what is in a closed fridge is
-    /// cold).
+    /// The scene, with the states that follow from its places (what is in a closed fridge is cold).
     pub fn build(mut self) -> Scene {
         self.scene.settle();
         debug_assert_eq!(self.scene.check(), Ok(()));
@@ -205,7 +210,9 @@ impl SceneBuilder {
     }
 }
 
-/// Spots on a rectangle that keeps `margin` from the walls, from the south-west corner round.
+/// Spots on a rectangle `margin` away from the walls, starting at the south-west corner.
+///
+/// - lengths: centimetres.
 fn ring(width: i16, depth: i16, margin: i16) -> Vec<(i16, i16)> {
     let (east, north) = ((width - margin).max(margin + 1), (depth - margin).max(margin + 1));
     let along = |from: i16, to: i16| (from..to).step_by(SPACING as usize);

@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use super::facts::{Kind, Room, facts};
 use super::features::{FEATURE_COUNT, features};
 use super::primitives::{Action, Chosen, act_on};
@@ -9,11 +11,12 @@ use super::{generate, planner, pointing, polarity, scene_file, task_goal, view, 
 use crate::ids::Digest;
 use crate::language::{Mention, Operator, Program, Signature, Step, Symbol};
 use crate::world::{
-    Domain, Edition, Infeasible, Lexicon, Pointing, SeedSet, Stage, StageError, View,
+    Edition, Features, Infeasible, Lexicon, Pointing, SeedSet, Show, Stage, StageError, View,
+    Words, World,
 };
 
-/// The household world: facts, names and seeds, read once from the embedded tables. One is made
-/// per process and shared behind an `Arc`.
+/// The household as a world: facts, names and seeds, read once from the embedded tables. Make one
+/// per process and share it behind an `Arc`.
 #[derive(Debug)]
 pub struct Household {
     signature: Signature,
@@ -23,6 +26,9 @@ pub struct Household {
 }
 
 impl Household {
+    /// Reads the embedded tables.
+    ///
+    /// - panics: when a table is broken; the tests read all of them.
     pub fn new() -> Household {
         let operator = |name: &str, args: usize| Operator {
             name: Symbol::new(name),
@@ -35,8 +41,8 @@ impl Household {
         Household { signature, lexicons: Edition::ALL.map(words::lexicon), seeds: words::seeds() }
     }
 
-    /// The recorded combinations of things for one form of task, in the words of [`Task::read`],
-    /// each once; none for a form that is not recorded.
+    /// The recorded tasks of one form, in the words of [`Task::read`], each once; empty for a form
+    /// that was not recorded.
     pub fn recorded_tasks(&self, form: &str) -> Vec<&'static str> {
         let rooms = Room::ALL.iter().map(|room| facts().room(*room).tasks.get(form));
         let mut tasks: Vec<&str> = rooms.flatten().flatten().map(String::as_str).collect();
@@ -52,7 +58,7 @@ impl Default for Household {
     }
 }
 
-impl Domain for Household {
+impl World for Household {
     type Scene = Scene;
     type Task = Task;
 
@@ -66,18 +72,6 @@ impl Domain for Household {
 
     fn signature(&self) -> &Signature {
         &self.signature
-    }
-
-    fn lexicon(&self, edition: Edition) -> &Lexicon {
-        let [first, second] = &self.lexicons;
-        match edition {
-            Edition::First => first,
-            Edition::Second => second,
-        }
-    }
-
-    fn seeds(&self) -> &SeedSet {
-        &self.seeds
     }
 
     fn stage(&self, request: &Stage) -> Result<(Scene, Task), StageError> {
@@ -94,10 +88,6 @@ impl Domain for Household {
                 Ok((scene, task))
             }
         }
-    }
-
-    fn step(&self, scene: &mut Scene, task: &Task, step: &Step) -> Result<Vec<String>, Infeasible> {
-        self.step_on(scene, task, step, &[])
     }
 
     fn step_on(
@@ -133,6 +123,24 @@ impl Domain for Household {
         planner::plan(scene, task)
     }
 
+    fn digest(&self, scene: &Scene) -> Digest {
+        scene.digest()
+    }
+}
+
+impl Words for Household {
+    fn lexicon(&self, edition: Edition) -> &Lexicon {
+        let [first, second] = &self.lexicons;
+        match edition {
+            Edition::First => first,
+            Edition::Second => second,
+        }
+    }
+
+    fn seeds(&self) -> &SeedSet {
+        &self.seeds
+    }
+
     fn resolve(&self, edition: Edition, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
         let lexicon = self.lexicon(edition);
         // What is in sight comes before what is shut away, as when walking there.
@@ -152,10 +160,14 @@ impl Domain for Household {
         if here.is_empty() {
             return mention.types.clone();
         }
-        // A meaning that hardly anybody has in mind waits until no other is here, however near it
-        // is. Of equally near kinds the one that people mean more often by the name.
+        // A rare meaning comes after all others, even if it is nearer. Of equally near kinds, the
+        // one that people mean more often by the name comes first.
         here.sort_unstable();
         here.into_iter().map(|(_, _, rank)| mention.types[rank].clone()).collect()
+    }
+
+    fn present(&self, scene: &Scene) -> BTreeSet<Symbol> {
+        scene.objects.iter().map(|object| object.kind.symbol().clone()).collect()
     }
 
     fn held(&self, scene: &Scene) -> Option<Symbol> {
@@ -175,14 +187,6 @@ impl Domain for Household {
             ("OPEN" | "CLOSE", _) => kind.openable(),
             _ => true,
         }
-    }
-
-    fn feature_count(&self) -> usize {
-        FEATURE_COUNT
-    }
-
-    fn features(&self, scene: &Scene, program: &Program) -> Vec<f32> {
-        features(scene, program)
     }
 
     fn contradiction(
@@ -214,11 +218,19 @@ impl Domain for Household {
     fn is_instance_word(&self, word: &str) -> bool {
         StateWord::read(word).is_some()
     }
+}
 
-    fn digest(&self, scene: &Scene) -> Digest {
-        scene.digest()
+impl Features for Household {
+    fn feature_count(&self) -> usize {
+        FEATURE_COUNT
     }
 
+    fn features(&self, scene: &Scene, program: &Program) -> Vec<f32> {
+        features(scene, program)
+    }
+}
+
+impl Show for Household {
     fn goal(&self, task: &Task) -> String {
         task.sentence()
     }

@@ -7,14 +7,15 @@ use serde::Deserialize;
 use super::words::nearest_word;
 use crate::language::Symbol;
 
-/// A kind of thing: `Mug`, `Fridge`. An index into the table of kinds, which is ordered by the
-/// number that `data/types.toml` gives each kind for ever.
+/// A kind of thing: `Mug`, `Fridge`. An index into the table of kinds, in the order of the numbers
+/// of `data/types.toml`. The number of a kind never changes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Kind(pub(super) u8);
 
 /// What is true of a kind. See `data/types.toml`.
 #[derive(Debug)]
 pub(super) struct KindFacts {
+    /// The name: `Mug`.
     pub symbol: Symbol,
     /// In a sentence: `coffee table`.
     pub said: String,
@@ -46,9 +47,13 @@ enum Flag {
 /// One of the four kinds of rooms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Room {
+    /// Food is kept, heated and cooled here.
     Kitchen,
+    /// People sit here.
     LivingRoom,
+    /// People sleep here.
     Bedroom,
+    /// People wash here.
     Bathroom,
 }
 
@@ -57,7 +62,9 @@ pub enum Room {
 pub(super) struct RoomFacts {
     /// Centimetres: east, north.
     pub size: (i16, i16),
+    /// How many scenes were recorded.
     pub scenes: u32,
+    /// In the order of their names.
     pub things: Vec<RoomThing>,
     /// Tasks that make sense here, by form.
     pub tasks: BTreeMap<String, Vec<String>>,
@@ -65,24 +72,30 @@ pub(super) struct RoomFacts {
 
 #[derive(Debug)]
 pub(super) struct RoomThing {
+    /// What it is.
     pub kind: Kind,
     /// Recorded scenes that have it.
     pub in_scenes: u32,
     /// How many there are: from, to.
     pub count: (u32, u32),
-    /// Where they were recorded, with how often.
+    /// Where they were recorded, each with the number of times.
     pub places: Vec<(Kind, u32)>,
 }
 
 /// All facts of the household.
 #[derive(Debug)]
 pub(super) struct Facts {
+    /// In the order of their numbers.
     pub kinds: Vec<KindFacts>,
     by_name: BTreeMap<String, Kind>,
     rooms: [RoomFacts; 4],
+    /// What heats.
     pub microwave: Kind,
+    /// What cools.
     pub fridge: Kind,
+    /// Where water washes.
     pub sink: Kind,
+    /// What makes water run.
     pub faucet: Kind,
 }
 
@@ -174,14 +187,14 @@ impl Facts {
     }
 
     /// The kind with exactly this name.
-    pub fn kind(&self, name: &str) -> Option<Kind> {
+    pub(crate) fn kind(&self, name: &str) -> Option<Kind> {
         self.by_name.get(name).copied()
     }
 
     /// The kind with this name in whatever case.
     ///
     /// - errors: a sentence that names the nearest known kind.
-    pub fn find(&self, name: &str) -> Result<Kind, String> {
+    pub(crate) fn find(&self, name: &str) -> Result<Kind, String> {
         if let Some(kind) = self.kind(name) {
             return Ok(kind);
         }
@@ -198,11 +211,13 @@ impl Facts {
         }
     }
 
-    pub fn room(&self, room: Room) -> &RoomFacts {
+    /// The facts of a kind of room.
+    pub(crate) fn room(&self, room: Room) -> &RoomFacts {
         &self.rooms[room as usize]
     }
 
-    pub fn all(&self) -> impl Iterator<Item = Kind> {
+    /// All kinds, in the order of their numbers.
+    pub(crate) fn all(&self) -> impl Iterator<Item = Kind> {
         (0..self.kinds.len()).map(|index| Kind(index as u8))
     }
 }
@@ -222,10 +237,12 @@ impl Kind {
         facts().kind(name)
     }
 
+    /// The name as a symbol.
     pub fn symbol(self) -> &'static Symbol {
         &self.facts().symbol
     }
 
+    /// The name: `Mug`.
     pub fn name(self) -> &'static str {
         self.facts().symbol.as_str()
     }
@@ -238,54 +255,60 @@ impl Kind {
         self.facts().flags & (1 << flag as u16) != 0
     }
 
+    /// Whether the robot can carry it.
     pub fn pickupable(self) -> bool {
         self.has(Flag::Pickupable)
     }
+    /// Whether something can be put in or on it.
     pub fn receptacle(self) -> bool {
         self.has(Flag::Receptacle)
     }
-    /// Anything that can be carried may be put on it.
+    /// Whether everything that can be carried may be put on it.
     pub fn surface(self) -> bool {
         self.has(Flag::Surface)
     }
-    /// One says "in" of it, not "on".
+    /// Whether things are *in* it, and not *on* it.
     pub fn inside(self) -> bool {
         self.has(Flag::Inside)
     }
-    /// Stands in the middle of a room, not along its walls.
+    /// Whether it stands in the middle of a room, and not along its walls.
     pub fn central(self) -> bool {
         self.has(Flag::Central)
     }
+    /// Whether it opens and closes.
     pub fn openable(self) -> bool {
         self.has(Flag::Openable)
     }
-    /// Stands open until something closes it.
+    /// Whether it is open until it is closed.
     pub fn usually_open(self) -> bool {
         self.has(Flag::UsuallyOpen)
     }
+    /// Whether it turns on and off.
     pub fn toggleable(self) -> bool {
         self.has(Flag::Toggleable)
     }
-    /// A lamp that a thing can be looked at under.
+    /// Whether it is a lamp that a thing can be looked at under.
     pub fn light(self) -> bool {
         self.has(Flag::Light)
     }
+    /// Whether a task may ask for it hot.
     pub fn heatable(self) -> bool {
         self.has(Flag::Heatable)
     }
+    /// Whether a task may ask for it cold.
     pub fn coolable(self) -> bool {
         self.has(Flag::Coolable)
     }
+    /// Whether it can be dirty, and be washed.
     pub fn cleanable(self) -> bool {
         self.has(Flag::Cleanable)
     }
-    /// A fixed container with a door: what the task word `closed` is about.
+    /// Whether it is a fixed container with a door. The task word `closed` is about these.
     pub fn has_door(self) -> bool {
         self.openable() && self.receptacle() && !self.pickupable()
     }
 
-    /// Furniture of which recorded rooms have several, or that has several parts of its name:
-    /// drawers, cabinets, shelves.
+    /// Whether it is furniture of which some recorded room has several: drawers, cabinets, shelves.
     pub(super) fn comes_several(self) -> bool {
         let several = |room: &Room| {
             facts().room(*room).things.iter().any(|thing| thing.kind == self && thing.count.1 > 1)
@@ -322,6 +345,7 @@ impl fmt::Display for Kind {
 }
 
 impl Room {
+    /// In the order of the tables.
     pub const ALL: [Room; 4] = [Room::Kitchen, Room::LivingRoom, Room::Bedroom, Room::Bathroom];
 
     /// In files: `living_room`.
@@ -347,7 +371,7 @@ impl Room {
         facts().room(self).things.iter().map(|thing| thing.kind)
     }
 
-    /// Reads the key, or the same with a blank, a hyphen or nothing for the underscore.
+    /// Reads the key; a blank, a hyphen or nothing may stand for the underscore.
     pub fn read(text: &str) -> Option<Room> {
         let bare = |text: &str| text.to_lowercase().replace(['_', ' ', '-'], "");
         Room::ALL.into_iter().find(|room| bare(room.key()) == bare(text))

@@ -1,4 +1,4 @@
-//! Draws scenes and tasks from a seed, in the likeness of the recorded ones.
+//! Draws scenes and tasks from a seed. They are like the recorded ones.
 
 use super::builder::{BuildError, ObjectId, SceneBuilder};
 use super::facts::{Kind, Room, facts};
@@ -86,7 +86,7 @@ fn draw_room(task: &Task, random: &mut Random) -> Room {
     let most = |room: &Room| needs.iter().filter(|kind| found(*room, **kind) > 0).count();
     match random.weighted(&rooms) {
         Some(room) => *room,
-        // Of equals the first, so that the choice does not depend on the iterator's habits.
+        // The first of equals, so that the choice does not depend on how the iterator breaks ties.
         None => Room::ALL.into_iter().rev().max_by_key(most).expect("there are four rooms"),
     }
 }

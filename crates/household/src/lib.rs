@@ -1,8 +1,9 @@
 //! A household: four kinds of rooms, a hundred kinds of things, and a robot with one hand.
 //!
-//! Everything that is true of a household stands in `data/` as readable tables, embedded
-//! in the binary; this room turns them into a world. Washing, heating and cooling are no commands:
-//! they follow from where a thing is when a faucet runs, a microwave runs or a fridge is closed.
+//! The facts of a household are readable tables in `data/`, embedded in the binary; this crate
+//! turns them into a world. There are no primitives for washing, heating and cooling: a thing
+//! becomes clean, hot or cold when it is in the right place while a faucet runs, a microwave runs
+//! or a fridge is closed.
 
 use apprentice_core::{ids, language, limits, world};
 

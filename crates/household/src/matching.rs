@@ -8,24 +8,28 @@ use super::task::Task;
 use crate::language::Program;
 use crate::world::Lexicon;
 
-/// A request for a scene that a given program fits: an evaluation has a recorded sentence and its
-/// program, but no recorded world.
+/// A request for a scene in which a given program runs. An evaluation needs it: it has a recorded
+/// sentence and its program, but no recorded scene.
 ///
-/// The scene holds what the program names, and among it `others` further things of the room, drawn
-/// by `seed`. The robot stands and holds what the program needs, doors are open or shut as it
-/// needs, and every type that it picks up without saying from where is somewhere in the room.
+/// The scene has the things that the program names, and `others` more things of the room, drawn
+/// from `seed`. The robot stands where the program needs it and holds what the program needs. Doors
+/// are open or shut as the program needs them. A type that it picks up without saying from where is
+/// somewhere in the room.
 #[derive(Debug, Clone)]
 pub struct MatchingScene<'a> {
+    /// The kind of room.
     pub room: Room,
+    /// What the scene must fit.
     pub program: &'a Program,
-    /// How many further things.
+    /// How many more things.
     pub others: usize,
-    /// Whether further things may share a name with what the program names.
+    /// Whether these may share a name with what the program names.
     pub clashes: bool,
     /// Whether what the program toggles is on at first.
     pub on: bool,
     /// What the robot holds at first, where the program does not say.
     pub held: Option<Kind>,
+    /// Every value is legal.
     pub seed: u64,
 }
 
@@ -44,12 +48,14 @@ struct Wish {
     on: bool,
 }
 
-/// Repairs of the sketch before it is given up; each adds or moves one thing.
+/// How often a sketch is repaired before it is given up. Each repair adds or moves one thing.
 const REPAIRS_MAX: usize = 100;
 
 impl MatchingScene<'_> {
-    /// - errors: a sentence with the step, when no scene fits the program (it puts a Mug on a Sofa)
-    ///   or it names what is no type.
+    /// Builds the scene.
+    ///
+    /// - errors: a sentence with the step, when no scene fits the program (it puts a Mug on a
+    ///   Sofa), or when it names something that is not a type.
     pub fn build(&self, lexicon: &Lexicon) -> Result<Scene, String> {
         let actions: Vec<Action> =
             self.program.steps.iter().map(Action::read).collect::<Result<_, _>>()?;
@@ -79,7 +85,7 @@ impl MatchingScene<'_> {
         Err(format!("no scene was found for {} in {REPAIRS_MAX} attempts", self.program))
     }
 
-    /// Adds what the room has besides, and puts what stands free and can be carried somewhere.
+    /// Adds the other things of the room, and gives every carriable thing without a place a place.
     fn furnish(&self, sketch: &mut Sketch, lexicon: &Lexicon, random: &mut Random) {
         let gold: Vec<Kind> = sketch.things.iter().map(|wish| wish.kind).collect();
         let share = |kind: Kind| {
@@ -95,7 +101,7 @@ impl MatchingScene<'_> {
             .room(self.room)
             .things
             .iter()
-            // A faucet without its basin is no thing of its own.
+            // A faucet is never alone: it comes with its basin.
             .filter(|thing| thing.kind != facts().faucet && !gold.contains(&thing.kind))
             .filter(|thing| self.clashes || !share(thing.kind))
             .map(|thing| (thing.kind, thing.in_scenes))
@@ -188,7 +194,7 @@ impl Sketch {
                         self.stands_at = Some(number);
                         true
                     }
-                    // What was carried elsewhere before: there must be another one here.
+                    // The program carried the first one away before, so a second one must be here.
                     _ if moved => {
                         let kind = at.object(index).kind;
                         let before = self.things.len();
@@ -328,8 +334,8 @@ impl Sketch {
         }
     }
 
-    /// Puts a thing that can be carried and lies about in or on something that can hold it and is
-    /// not behind a door; and a further lamp on a table.
+    /// Puts a carriable thing without a place in or on something that can hold it and is not behind
+    /// a door, and a further lamp on a table.
     fn settle_down(&mut self, number: usize, random: &mut Random) {
         let wish = &self.things[number];
         let used = self.held == Some(number) || self.stands_at == Some(number);

@@ -1,17 +1,18 @@
 //! The fewest primitives that achieve a task: A* over scenes with [`bound::remaining`] as the
 //! lower bound.
 //!
-//! **Why the answer is exact.** A step names kinds, and which instance it binds to depends on
-//! where the robot stands. So the search carries out real steps ([`act`]) on a smaller scene that
-//! keeps every instance of every *relevant* kind — what the task names, its appliances, what any
-//! instance of those is in or on or, when it can be carried, contains, what the hand holds and where
-//! that can be put — with everything around them and every free-standing thing. Steps on other kinds change nothing that the goal or a binding looks at,
-//! with one exception: walking to another thing can change which instance is nearest. Those walks
-//! are tried too. What a relevant step does depends on relevant things only, so each step of the
-//! small scene does the same in the whole one, and no useful step is left out. Turning things on
-//! that do not matter, and putting relevant things where the goal and the appliances are not, cost
-//! a step and give nothing that walking does not: the exceptions (a full hand, a mover for what
-//! it contains) are kept.
+//! **Why the answer is exact.** A step names kinds, and which instance it binds to depends on where
+//! the robot stands. So the search carries out real steps ([`act`]) on a smaller scene that keeps
+//! every instance of every *relevant* kind — what the task names, its appliances, what any instance
+//! of those is in or on or, when it can be carried, contains, what the hand holds and where that
+//! can be put — with everything around them and every free-standing thing. Steps on other kinds
+//! change nothing that the goal or a binding looks at, with one exception: walking to another thing
+//! can change which instance is nearest. Those walks are tried too. The effect of a relevant step
+//! depends on relevant things only, so each step of the small scene does the same in the whole one,
+//! and no useful step is left out. Two kinds of steps are left out because they cost a step and
+//! give nothing that walking does not: turning on things that do not matter, and putting relevant
+//! things where neither the goal nor an appliance is. The exceptions (a full hand, a container that
+//! moves its contents) are tried.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -26,13 +27,13 @@ use super::task_goal::achieved;
 use crate::language::Program;
 use crate::limits::PROGRAM_STEPS_MAX;
 
-/// Things in all scenes looked at, before the planner gives up: about 15,000 scenes of an ordinary
-/// room, fewer of a crowded one, so that no scene file can keep the planner busy for long.
+/// How many things, counted over all scenes that it looks at, the planner handles before it gives
+/// up: about 15,000 scenes of an ordinary room, fewer of a crowded one. So no scene file can keep
+/// it busy for long.
 const THINGS_MAX: usize = 1_000_000;
 
-/// A program with the fewest primitives that achieves the task; empty programs do not exist, so a
-/// task that is already done has none. `None` also beyond [`THINGS_MAX`] or
-/// [`PROGRAM_STEPS_MAX`] steps.
+/// A program with the fewest primitives that achieves the task. None for a task that is already
+/// done, because no program is empty, and beyond [`THINGS_MAX`] or [`PROGRAM_STEPS_MAX`].
 pub(super) fn plan(scene: &Scene, task: &Task) -> Option<Program> {
     let missing = |kind: &Kind| scene.of(*kind).next().is_none();
     if matches!(task.goal, Goal::Free(_))
@@ -157,7 +158,7 @@ impl<'a> Search<'a> {
         next
     }
 
-    /// Walks to what does not matter itself. One for each place that is reached so.
+    /// Walks to things that do not matter themselves: one walk for each place.
     fn walks(&self, scene: &Scene, next: &mut Vec<(Action, Scene)>) {
         let mut reached: Vec<Index> = scene.robot.at.into_iter().collect();
         for (kind, stands) in &self.stands {
@@ -209,7 +210,7 @@ fn relevant(scene: &Scene, task: &Task) -> Vec<Kind> {
     if let Some(held) = scene.robot.holds {
         let held = scene.object(held).kind;
         mark(held);
-        // Whatever it is, putting it down here and now may be the shortest way on.
+        // Putting down what the hand holds may be the shortest way, whatever it is.
         let places = scene.objects.iter().map(|object| object.kind);
         places.filter(|place| place.may_hold(held)).for_each(|place| {
             mark(place);

@@ -7,10 +7,10 @@ use super::state_words::StateWord;
 use crate::language::Symbol;
 use crate::world::Pointing;
 
-/// The instance that the words choose; none when they choose nothing, or leave out none of several.
+/// The instance that the words choose; none when they choose nothing, or when all of several fit.
 ///
-/// What is known to fit comes before what nothing is known of, and that is taken rather than
-/// refused. Of several that fit, the nearest in sight.
+/// A thing that is known to fit comes first, then one of which nothing is known. Of several, the
+/// nearest in sight is taken.
 ///
 /// - errors: a sentence, when no instance is as the words say.
 pub(super) fn choose(
@@ -36,14 +36,15 @@ pub(super) fn choose(
         choice.other(&choice.handled(pointing))?;
     }
     let known_place = |p: &&Vec<Symbol>| (several || pointing.strictly) && is_here(scene, p);
-    // Of one thing alone, and of a place that is not here, people say where it is as they see it.
+    // The words about a place are ignored when there is only one such thing, or when the scene has
+    // no such place: people name places as they see them.
     if let Some(places) = pointing.place.as_ref().filter(|p| known_place(p)) {
         choice.place(places)?;
     }
     if pointing.here {
         choice.narrow("in reach", |index| Some(scene.in_reach(index)))?;
     }
-    // Each state once, however often an utterance of thousands of words repeats it.
+    // Each state once: an utterance may repeat it many times.
     let mut asked: Vec<StateWord> = Vec::new();
     for word in &pointing.words {
         let Some(state) = StateWord::read(word).filter(|state| !asked.contains(state)) else {
@@ -60,7 +61,7 @@ pub(super) fn choose(
     Ok(choice.result())
 }
 
-/// Whether anything in it is about instances.
+/// Whether any of the words chooses between instances.
 fn points(pointing: &Pointing) -> bool {
     pointing.number.is_some()
         || pointing.ordinal.is_some()
@@ -83,7 +84,7 @@ struct Choice<'a> {
     kind: Kind,
     /// In the view's order, never empty.
     left: Vec<Index>,
-    /// The words single some out, also when that is the only one or leaves all.
+    /// Whether words singled out one of the things, even if it is the only one.
     named: bool,
     /// `Mug`, or `other Mug`.
     noun: String,
@@ -128,8 +129,8 @@ impl<'a> Choice<'a> {
         Ok(())
     }
 
-    /// The things of the kind that were handled, newest first. What the robot holds was handled,
-    /// even when nobody saw it.
+    /// The things of the kind that were handled, newest first. The thing in the hand counts as
+    /// handled, even if it was there at the start.
     fn handled(&self, pointing: &Pointing) -> Vec<Index> {
         let named = pointing.handled.iter().filter_map(|name| self.scene.named(name));
         let all = named.chain(self.scene.robot.holds);

@@ -5,9 +5,9 @@ use super::state_words::StateWord;
 use super::task::Task;
 use crate::language::{Program, Step, Symbol};
 
-/// Whether the words ask to turn on what is on, or off what is off. TOGGLE itself has no
-/// direction (the paper's primitive), so only the words can contradict the scene; and only when
-/// the program is that one TOGGLE, since one that toggles twice means both.
+/// Whether the words ask to turn on what is on, or off what is off. TOGGLE, the paper's primitive,
+/// has no direction, so only the words can contradict the scene. Only a program of one TOGGLE is
+/// looked at: one that toggles twice means both directions.
 pub(super) fn contradiction(
     scene: &Scene,
     words: &[String],
@@ -26,10 +26,10 @@ pub(super) fn contradiction(
     Some((0, format!("the {} is already {state}", scene.name(index))))
 }
 
-/// `true` for on, `false` for off, nothing when the words do not say.
+/// `true` for on, `false` for off, none when the words do not say.
 ///
-/// "off" decides wherever it stands ("turn the lamp on the desk off"); "on" alone may be about a
-/// place ("toggle the lamp on the desk") and counts only beside a verb that takes it.
+/// "off" counts at every place ("turn the lamp on the desk off"). "on" may also name a place
+/// ("toggle the lamp on the desk"), so it counts only together with a verb that takes it.
 fn wanted(words: &[String]) -> Option<bool> {
     const TAKE_ON: [&str; 10] =
         ["turn", "turns", "turning", "switch", "power", "flip", "click", "put", "get", "flick"];
@@ -44,7 +44,7 @@ fn wanted(words: &[String]) -> Option<bool> {
     }
 }
 
-/// Whether the thing that a TOGGLE would work is on.
+/// Whether the thing that a TOGGLE would switch is on.
 pub(super) fn is_on(scene: &Scene, step: &Step) -> bool {
     let Ok(action @ Action::Toggle(_)) = Action::read(step) else { return false };
     match act(&mut scene.clone(), &Task::free(), action) {
@@ -53,8 +53,8 @@ pub(super) fn is_on(scene: &Scene, step: &Step) -> bool {
     }
 }
 
-/// Whether all things of a type are in the state opposite to the one a word names. Nothing is known
-/// of a thing that is in neither, such as one that is neither hot nor cold: "the cooked potato".
+/// Whether all things of a type are in the state opposite to the one that a word names. A thing may
+/// be in neither ("the hot potato", when the potato is neither hot nor cold); then this is false.
 pub(super) fn unlike(scene: &Scene, kind: &Symbol, word: &str) -> bool {
     let Some(opposite) = StateWord::read(word).and_then(StateWord::opposite) else {
         return false;

@@ -24,9 +24,11 @@ pub(super) enum Bound {
 }
 
 impl Action {
-    /// - errors: a sentence, when an argument is no kind of the household. The operator and the
+    /// Reads a step.
+    ///
+    /// - errors: a sentence, when an argument is not a kind of the household. The operator and the
     ///   number of arguments were checked against the signature.
-    pub fn read(step: &Step) -> Result<Action, String> {
+    pub(crate) fn read(step: &Step) -> Result<Action, String> {
         let kind = |index: usize| match step.args.get(index) {
             Some(name) => facts().find(name.as_str()),
             None => Err(format!("{step} lacks an argument")),
@@ -42,7 +44,8 @@ impl Action {
         }
     }
 
-    pub fn step(self) -> Step {
+    /// The action as a step of a program.
+    pub(crate) fn step(self) -> Step {
         let (operator, kinds) = match self {
             Action::Goto(kind) => ("GOTO", vec![kind]),
             Action::Pickup(kind) => ("PICKUP", vec![kind]),
@@ -187,7 +190,8 @@ fn open(scene: &mut Scene, wanted: Wanted) -> Result<Bound, Refusal> {
         let object = scene.object(index);
         match (object.shut(), object.is(State::On)) {
             (false, _) => Err(Refusal::AlreadyOpen(index)),
-            // A laptop may run with its lid down; only what works behind its door keeps it shut.
+            // A laptop may run with its lid closed. Only a thing that works behind its door must be
+            // shut.
             (true, true) if kind.receptacle() => Err(Refusal::Running(index)),
             (true, _) => Ok(()),
         }
@@ -242,15 +246,15 @@ fn reachable(scene: &Scene, index: Index) -> Result<(), Refusal> {
     }
 }
 
-/// What decides between instances, smallest first; the distance comes last.
+/// The order in which instances are taken, smallest first. The distance comes last.
 type Order = (bool, bool, (i64, i64));
 
-/// The nearest of the candidates that `can` be used. With a task (for walking and picking up), what
-/// is not yet at its goal comes before what is, and what is in sight before what is shut away;
-/// ties go to the earlier thing.
+/// The nearest of the candidates that `can` be used. With a task (for walking and picking up),
+/// things that are not yet at their goal come first, and among these, things in sight. Ties go to
+/// the earlier thing.
 ///
-/// - errors: why the nearest of the others cannot be used; what is in reach comes first, since its
-///   reason says more than "out of reach".
+/// - errors: why the nearest candidate cannot be used. A candidate in reach comes first, because
+///   its reason says more than "out of reach".
 fn bind(
     scene: &Scene,
     wanted: Wanted,
@@ -285,8 +289,8 @@ fn bind(
     }
 }
 
-/// A place on or in a receptacle that depends on nothing but which thing it is, so that putting
-/// things down in another order leads to the same scene, and so does a scene without the rest.
+/// A place in or on a receptacle that depends on the two things alone. So putting things down in
+/// another order gives the same scene, and a scene without other things gives the same place.
 pub(super) fn spot_on(scene: &Scene, receptacle: Index, thing: Index) -> (i16, i16) {
     let (x, y) = scene.place(receptacle);
     let kind = scene.object(thing).kind;

@@ -4,7 +4,7 @@ use super::scene::{Index, Scene};
 use super::words::a;
 
 /// Why a primitive cannot be carried out. Small and without text: the planner and the feasibility
-/// filter meet thousands of them, and only a person needs the sentence.
+/// filter get thousands of them, and only a person needs the sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Refusal {
     /// The scene has no thing of this kind.
@@ -21,7 +21,7 @@ pub(super) enum Refusal {
     AlreadyClosed(Index),
     /// It runs, so its door stays shut.
     Running(Index),
-    /// It stands open, so it does not start.
+    /// Its door is open, so it does not start.
     DoorOpen(Index),
     NotToggleable(Kind),
     /// The robot holds something else, or nothing.
@@ -36,8 +36,8 @@ pub(super) enum Refusal {
 }
 
 impl Refusal {
-    /// One sentence that names the thing and the reason, and what to do where there is something.
-    pub fn sentence(self, scene: &Scene) -> String {
+    /// One sentence that names the thing, the reason, and what to do about it if anything helps.
+    pub(crate) fn sentence(self, scene: &Scene) -> String {
         let the = |index: Index| format!("the {}", scene.name(index));
         let hand = match scene.robot.holds {
             Some(held) => format!("it holds {}", the(held)),
@@ -92,7 +92,7 @@ impl Refusal {
 
 impl Refusal {
     /// Whether what `action` is for holds already.
-    pub fn holds_already(self, scene: &Scene, action: Action) -> bool {
+    pub(crate) fn holds_already(self, scene: &Scene, action: Action) -> bool {
         match (self, action) {
             (Refusal::AlreadyOpen(_) | Refusal::AlreadyClosed(_), _) => true,
             (Refusal::InHand(held), Action::Pickup(kind) | Action::Goto(kind)) => {
@@ -110,9 +110,9 @@ impl Refusal {
         }
     }
 
-    /// The action that would have to come first, where one action is what is missing, and the
-    /// instance for it: none unless the thing that is refused was chosen.
-    pub fn first(self, scene: &Scene, chosen: Chosen) -> Option<(Action, Option<Index>)> {
+    /// The one action that is missing before this one, where one is enough, and the instance for
+    /// it: none unless the refused thing was chosen.
+    pub(crate) fn first(self, scene: &Scene, chosen: Chosen) -> Option<(Action, Option<Index>)> {
         let kind = |index: Index| scene.object(index).kind;
         let (action, refused, target) = match self {
             Refusal::OutOfReach(index) => (Action::Goto(kind(index)), index, index),
@@ -120,7 +120,7 @@ impl Refusal {
             Refusal::Shut(index) => (Action::Open(kind(index)), index, index),
             _ => return None,
         };
-        // A free argument stays free, so that the first step binds as it always has.
+        // A free argument stays free, so that the step binds as it does without chosen things.
         Some((action, chosen.contains(&Some(refused)).then_some(target)))
     }
 }

@@ -4,9 +4,9 @@ use crate::limits::SCENE_OBJECTS_MAX;
 
 /// The state of a room at one moment: its things and the robot.
 ///
-/// Flat and without pointers, so that a clone is one copy of about ten bytes a thing. Lengths are
-/// centimetres from the room's south-west corner. Serialises with names
-/// (`scene_text.rs`); reading that back validates.
+/// Flat and without pointers, so that a clone copies about ten bytes per thing. Lengths are
+/// centimetres from the room's south-west corner. Serialised with names (`scene_text.rs`); reading
+/// checks what it reads.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Scene {
     pub(super) room: Room,
@@ -19,21 +19,26 @@ pub(super) type Index = u16;
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Robot {
+    /// Centimetres to the east.
     pub x: i16,
+    /// Centimetres to the north.
     pub y: i16,
-    /// The free-standing thing it stands at; everything in and on that is in reach.
+    /// The free-standing thing it stands at. Everything in and on that thing is in reach.
     pub at: Option<Index>,
+    /// What it holds.
     pub holds: Option<Index>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Object {
+    /// What it is.
     pub kind: Kind,
     /// Bits of [`State`].
     pub states: u8,
-    /// Where it is. For what is in the hand, and for what that contains, both are 0: those are
-    /// where the robot is ([`Scene::place`]).
+    /// Centimetres to the east. 0 for a thing in the hand and all that it contains: they are where
+    /// the robot is ([`Scene::place`]).
     pub x: i16,
+    /// Centimetres to the north; 0 where `x` is 0 for the hand.
     pub y: i16,
     /// What it is in or on; none for what stands on the floor or is in the hand.
     pub parent: Option<Index>,
@@ -43,17 +48,25 @@ pub(super) struct Object {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum State {
+    /// Its door is open.
     Open = 1,
+    /// It is turned on.
     On = 2,
+    /// It needs washing.
     Dirty = 4,
+    /// It was heated, and not cooled since.
     Hot = 8,
+    /// It was cooled, and not heated since.
     Cold = 16,
 }
 
 impl State {
-    pub const ALL: [State; 5] = [State::Open, State::On, State::Dirty, State::Hot, State::Cold];
+    /// In the order of their bits.
+    pub(crate) const ALL: [State; 5] =
+        [State::Open, State::On, State::Dirty, State::Hot, State::Cold];
 
-    pub fn word(self) -> &'static str {
+    /// In sentences: `open`.
+    pub(crate) fn word(self) -> &'static str {
         match self {
             State::Open => "open",
             State::On => "on",
@@ -65,7 +78,7 @@ impl State {
 
     /// Whether a thing of this kind can be in this state. Anything that fits a fridge or a
     /// microwave may become cold or hot there.
-    pub fn fits(self, kind: Kind) -> bool {
+    pub(crate) fn fits(self, kind: Kind) -> bool {
         match self {
             State::Open => kind.openable(),
             State::On => kind.toggleable(),
@@ -76,24 +89,27 @@ impl State {
 }
 
 impl Object {
-    pub fn is(&self, state: State) -> bool {
+    /// Whether it is in this state.
+    pub(crate) fn is(&self, state: State) -> bool {
         self.states & state as u8 != 0
     }
 
-    pub fn set(&mut self, state: State, holds: bool) {
+    /// Brings it into this state, or out of it.
+    pub(crate) fn set(&mut self, state: State, holds: bool) {
         match holds {
             true => self.states |= state as u8,
             false => self.states &= !(state as u8),
         }
     }
 
-    /// Shut, so that nothing gets in or out.
-    pub fn shut(&self) -> bool {
+    /// Whether it is shut, so that nothing gets in or out.
+    pub(crate) fn shut(&self) -> bool {
         self.kind.openable() && !self.is(State::Open)
     }
 }
 
 impl Scene {
+    /// The kind of room.
     pub fn room(&self) -> Room {
         self.room
     }
@@ -117,8 +133,8 @@ impl Scene {
         std::iter::successors(self.object(index).parent, |&i| self.object(i).parent)
     }
 
-    /// The free-standing (or held) thing that this one is in or on, through whatever is between;
-    /// the thing itself when it stands free.
+    /// The free-standing (or held) thing that this one is in or on, directly or through others; the
+    /// thing itself when it stands free.
     pub(super) fn root(&self, index: Index) -> Index {
         self.ancestors(index).last().unwrap_or(index)
     }
@@ -146,8 +162,8 @@ impl Scene {
         }
     }
 
-    /// How far the thing is: first the square of the distance to what it is in or on (0 for what
-    /// is in reach), then of that to itself. Integer arithmetic, so equal everywhere.
+    /// How far the thing is, in square centimetres: to its [`Scene::root`] (0 for what is in
+    /// reach), then to the thing itself. Integers, so equal on every machine.
     pub(super) fn distance(&self, index: Index) -> (i64, i64) {
         let square = |(x, y): (i16, i16)| {
             let dx = i64::from(x) - i64::from(self.robot.x);
@@ -179,11 +195,12 @@ impl Scene {
             None => (name, 1),
         };
         let index = self.of(Kind::named(kind)?).nth(number.checked_sub(1)?)?;
-        // "Mug" names none of several, and "Mug 1" or "Mug 02" is no name of the only one.
+        // With several mugs, "Mug" names none of them. With one, "Mug 1" and "Mug 02" do not name
+        // it.
         (self.name(index) == name).then_some(index)
     }
 
-    /// BLAKE3 over a fixed binary form: room, robot, number of things, eight bytes a thing.
+    /// BLAKE3 over a fixed binary form: room, robot, number of things, eight bytes per thing.
     /// Absent indices are 0xffff; integers are big-endian.
     pub fn digest(&self) -> Digest {
         const HEAD: usize = 12;

@@ -11,11 +11,11 @@
 //!
 //! [[thing]]
 //! type = "Mug"
-//! in = "CounterTop"           # `in` or `on`, either is right; a thing further up
+//! in = "CounterTop"           # `in` or `on`, both mean the same; a thing further up
 //! states = ["dirty"]          # of open, closed, on, off, dirty, clean, hot, cold
 //! ```
 //!
-//! Things are called as the robot calls them: `Mug` when there is one, `Mug 1`, `Mug 2` when there
+//! Things have the names that the robot uses: `Mug` when there is one, `Mug 1`, `Mug 2` when there
 //! are several, counted from the top (while reading, `Mug` also means the first). A fridge, a
 //! cabinet and the like are closed, boxes and laptops are open, everything is off and clean unless
 //! its states say otherwise; what is in a closed fridge is cold.

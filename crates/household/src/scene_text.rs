@@ -117,7 +117,7 @@ fn read(text: SceneText) -> Result<Scene, String> {
     Ok(scene)
 }
 
-/// [`Scene::name`] of everything, counted once and not once for each thing.
+/// The [`Scene::name`] of every thing, in one pass over the scene.
 fn names(scene: &Scene) -> BTreeMap<String, Index> {
     let mut of_kind = BTreeMap::<Kind, u16>::new();
     scene.objects.iter().for_each(|object| *of_kind.entry(object.kind).or_default() += 1);
@@ -141,7 +141,7 @@ impl Scene {
     pub(super) fn check(&self) -> Result<(), String> {
         for index in 0..self.objects.len() as Index {
             let Some(parent) = self.object(index).parent else { continue };
-            // More steps up than there are things: the chain bites its tail.
+            // There are more steps up than things, so the chain is a circle.
             let steps = self.ancestors(index).take(self.objects.len() + 1).count();
             if steps > self.objects.len() {
                 return Err(format!("the {} is inside itself", self.name(index)));
@@ -170,7 +170,7 @@ impl Scene {
 mod tests {
     use super::*;
     use crate::Household;
-    use crate::world::{Domain, Stage};
+    use crate::world::{Stage, World};
 
     #[test]
     fn names_counted_once_are_those_counted_one_by_one() {

@@ -17,8 +17,8 @@ pub(super) enum StateWord {
     Full,
 }
 
-/// Recipes that ship ask [`StateWord::opposite`] for clean, cold and hot: a word more or less in
-/// these three rows changes their answers.
+/// The words of each state. Released recipes use [`StateWord::opposite`] of clean, cold and hot, so
+/// a change in these three rows would change their answers.
 const WORDS: [(&[&str], StateWord); 10] = [
     (&["clean", "cleaned", "washed", "rinsed"], StateWord::Clean),
     (&["cold", "chilled", "cooled"], StateWord::Cold),
@@ -33,13 +33,14 @@ const WORDS: [(&[&str], StateWord); 10] = [
 ];
 
 impl StateWord {
-    pub fn read(word: &str) -> Option<StateWord> {
+    /// The state that a word names; none for other words.
+    pub(crate) fn read(word: &str) -> Option<StateWord> {
         let row = WORDS.iter().find(|(words, _)| words.contains(&word));
         row.map(|(_, state)| *state)
     }
 
-    /// The state that contradicts the word, where a thing may also be in neither.
-    pub fn opposite(self) -> Option<State> {
+    /// The state that contradicts the word, for words that released recipes ask about.
+    pub(crate) fn opposite(self) -> Option<State> {
         match self {
             StateWord::Clean => Some(State::Dirty),
             StateWord::Cold => Some(State::Hot),
@@ -48,9 +49,9 @@ impl StateWord {
         }
     }
 
-    /// Whether the thing is so; none when nothing is known of it: a mug that is neither hot nor
-    /// cold, and an open shelf, since a shelf has no door.
-    pub fn holds(self, scene: &Scene, index: Index) -> Option<bool> {
+    /// Whether the thing is in the state; none when that is not known: for "hot" and a mug that is
+    /// neither hot nor cold, for "open" and a shelf, which has no door.
+    pub(crate) fn holds(self, scene: &Scene, index: Index) -> Option<bool> {
         let object = scene.object(index);
         let kind = object.kind;
         let is = |state: State| object.is(state);

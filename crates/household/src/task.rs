@@ -68,7 +68,7 @@ impl Task {
         Task { goal: Goal::Free(None), closed: false }
     }
 
-    /// Reads a task in the domain's words: `clean Tomato CounterTop`. Names of kinds in any case.
+    /// Reads a task in the world's words: `clean Tomato CounterTop`. Names of kinds in any case.
     ///
     /// - errors: [`StageError::Task`]: an unknown form or kind, a wrong number of words, or a task
     ///   that makes no sense ("heat Book Sofa").
@@ -80,7 +80,7 @@ impl Task {
         })
     }
 
-    /// The kinds the task cannot do without, appliances included; the main thing first.
+    /// The kinds that the task needs, with appliances; the main thing first.
     pub(super) fn needs(&self) -> Vec<Kind> {
         let facts = facts();
         match self.goal {

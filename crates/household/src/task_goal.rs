@@ -8,8 +8,8 @@ use super::words::a;
 
 /// Whether the task's goal holds. A task without a goal is never achieved.
 ///
-/// Goals name kinds, as programs do: `two CD Drawer` is done with two CDs in drawers, be it one
-/// drawer or two.
+/// Goals name kinds, as programs do: `two CD Drawer` is done with two CDs in one drawer or in two
+/// drawers.
 pub(super) fn achieved(scene: &Scene, task: &Task) -> bool {
     let goal = match task.goal {
         Goal::Free(_) => false,
@@ -114,7 +114,8 @@ pub(super) enum Wanted {
 }
 
 impl Wanted {
-    pub fn holds(self, scene: &Scene, index: Index) -> bool {
+    /// Whether the thing is in the state.
+    pub(crate) fn holds(self, scene: &Scene, index: Index) -> bool {
         let object = scene.object(index);
         match self {
             Wanted::Clean => !object.is(State::Dirty),

@@ -1,5 +1,5 @@
-//! Recorded steps and reasons, as the robot says them to a person. The records keep the domain's
-//! own words, because an audit compares them; only what is shown changes.
+//! Recorded steps and reasons, as the robot says them to a person. The records keep the words of
+//! the world, because an audit compares them; only what is shown is different.
 
 use super::facts::facts;
 use super::refusal::preposition;
@@ -21,8 +21,8 @@ pub fn request(step: &Step) -> String {
     }
 }
 
-/// An argument with its article. What no thing could be found for keeps the word that the person
-/// used.
+/// An argument with its article. An argument that is not a kind is a word that the person used; it
+/// stays as it is.
 fn the(arg: &str) -> String {
     match (facts().kind(arg), arg) {
         (Some(kind), _) => format!("the {}", kind.said()),
@@ -87,8 +87,8 @@ fn in_lower_case(word: &str) -> String {
     }
 }
 
-/// The request names the thing, so the reason need not. A number says which of several it is, and
-/// stays.
+/// Says "it" for the thing in a reason, because the request has named it. A thing with a number
+/// keeps its name, because the number says which one it is.
 fn it_for(thing: &str, told: &str) -> String {
     let Some((before, after)) = told.split_once(thing) else { return told.to_owned() };
     let goes_on = after.trim_start().starts_with(|c: char| c.is_ascii_digit());

@@ -4,8 +4,8 @@ use super::scene::{Index, Scene, State};
 use crate::language::Step;
 use crate::world::{Thing, View};
 
-/// What a person sees: everything, also what is behind a closed door, since nobody can ask the
-/// robot to look.
+/// What a person sees: everything, even behind closed doors, because the robot has no primitive for
+/// looking inside.
 pub(super) fn look(scene: &Scene) -> View {
     let mut summary = vec![format!("this is a {}", scene.room().said())];
     summary.push(match scene.robot.at {

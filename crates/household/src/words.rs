@@ -18,7 +18,7 @@ struct Words {
     fixtures: BTreeMap<String, String>,
 }
 
-/// What the second edition has besides.
+/// What the second edition adds.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Further {
@@ -117,7 +117,7 @@ pub(super) fn nearest_word<'a>(
     word: &str,
     known: impl Iterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    // A request may carry kilobytes where a name belongs; its start is enough to suggest by.
+    // A request may have kilobytes in the place of a name; the start is enough for a suggestion.
     let word: String = word.chars().take(40).collect::<String>().to_lowercase();
     known.min_by_key(|candidate| edits(&word, &candidate.to_lowercase()))
 }

@@ -6,7 +6,7 @@ use std::error::Error;
 use std::sync::Arc;
 
 use apprentice_core::language::{Outcome, Utterance};
-use apprentice_core::world::{Domain, Stage};
+use apprentice_core::world::{Stage, World};
 use apprentice_household::Household;
 use apprentice_mind::grounding::Moment;
 use apprentice_mind::learning::{Lesson, Recipe, train};
@@ -40,7 +40,7 @@ pub fn outcomes() -> Result<Vec<Outcome>, Box<dyn Error>> {
     said.map(|text| Ok(mind.interpret(moment(), &Utterance::new(text)?).outcome)).collect()
 }
 
-pub fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
     for (text, outcome) in SAID.iter().zip(outcomes()?) {
         println!("{text}: {outcome:?}");
     }

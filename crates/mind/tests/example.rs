@@ -1,7 +1,7 @@
 //! The example does what its page says.
 
 #[path = "../examples/teach.rs"]
-#[allow(dead_code)]
+#[allow(dead_code, unreachable_pub, reason = "the example is a program of its own")]
 mod teach;
 
 use apprentice_core::language::Outcome;

@@ -84,7 +84,7 @@ fn object(lexicon: &Lexicon, row: &Row, words: &[String]) -> Option<Kind> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use apprentice::world::Domain;
+    use apprentice::world::Words;
     use apprentice::world::household::{Household, Room};
 
     #[test]

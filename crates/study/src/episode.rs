@@ -6,7 +6,7 @@ use std::sync::Arc;
 use apprentice::language::{Answer, Program, Symbol, tokens};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::world::household::{Household, Kind, Scene, Task};
-use apprentice::world::{Domain, Edition};
+use apprentice::world::{Edition, Words};
 
 use super::corpus::Row;
 use super::draw;

@@ -5,7 +5,7 @@ use std::fmt;
 use apprentice::grounding::Abstractor;
 use apprentice::language::{Answer, Evidence, Mention, Outcome, Program, Step, Symbol, Utterance};
 use apprentice::learning::Recipe;
-use apprentice::world::Domain;
+use apprentice::world::Words;
 use apprentice::world::household::{Household, Kind, Scene};
 
 use super::corpus::Row;

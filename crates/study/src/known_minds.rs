@@ -7,7 +7,7 @@ use apprentice::ids::Digest;
 use apprentice::language::{Program, Utterance};
 use apprentice::learning::{Lesson, Recipe, TrainError, pinned, train};
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 
 const WASH: &str = "GOTO SinkBasin; PUT Mug SinkBasin; TOGGLE Faucet; TOGGLE Faucet; PICKUP Mug";
 const COOL: &str =

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use apprentice::grounding::Moment;
 use apprentice::language::Answer;
 use apprentice::learning::{Mind, TrainError, train};
-use apprentice::world::Domain;
+use apprentice::world::Words;
 use apprentice::world::household::{Household, Scene, Task};
 use serde::Serialize;
 

@@ -90,7 +90,7 @@ pub fn replace(program: &Program, from: &Symbol, to: &Symbol) -> Program {
 mod tests {
     use super::*;
     use apprentice::world::household::Household;
-    use apprentice::world::{Domain, Edition};
+    use apprentice::world::{Edition, Words};
 
     fn check(sentence: &str, from: &str, name: &str, expected: Option<&str>) {
         let household = Household::new();

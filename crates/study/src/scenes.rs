@@ -8,7 +8,7 @@ use std::str::FromStr;
 use apprentice::language::{Program, Symbol};
 use apprentice::numerics::Rng;
 use apprentice::world::household::{Household, MatchingScene, Scene, Task};
-use apprentice::world::{Domain, Edition, Lexicon};
+use apprentice::world::{Edition, Lexicon, Words, World};
 
 use super::carried::carried;
 use super::corpus::Row;
@@ -137,6 +137,7 @@ fn names_by_kind(lexicon: &Lexicon) -> BTreeMap<Symbol, BTreeSet<&str>> {
 mod tests {
     use super::*;
     use crate::draw;
+    use apprentice::world::Show;
     use apprentice::world::household::{Room, Task};
 
     fn row(room: Room, program: &str) -> Row {

@@ -1,8 +1,8 @@
 //! Judging an answer against what was recorded.
 
 use apprentice::language::{Evidence, Outcome, Program, Step, Symbol};
-use apprentice::world::Domain;
 use apprentice::world::household::{Household, Scene, Task};
+use apprentice::world::{Show, World};
 use serde::Serialize;
 
 use super::corpus::Row;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use apprentice::language::{Exemplar, Symbol, Utterance, Word};
 use apprentice::numerics::Rng;
 use apprentice::world::household::{Household, Kind, Room};
-use apprentice::world::{Domain, Edition};
+use apprentice::world::{Edition, Words};
 
 use super::corpus::Row;
 use super::draw;

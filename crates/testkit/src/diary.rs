@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use apprentice::client::{OnClash, Phase, Reply, Told};
-use apprentice::events::{Batch, Event, Head, Record, Report};
+use apprentice::events::{Batch, Event, Head, Record};
 use apprentice::ids::{RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
-use apprentice::learning::{self, Mind, Recipe, train};
+use apprentice::learning::{Mind, Recipe, train};
 use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session};
 use apprentice::store::Store;
 use apprentice::world::{Domain, Stage};
@@ -111,7 +111,7 @@ impl<D: Domain> Diary<D> {
             panic!("nothing is due");
         };
         let mind = Arc::new(train(&**self.session.domain(), &recipe, &lessons).unwrap());
-        let outcome = Ok((mind.digest(), report(&mind)));
+        let outcome = Ok((mind.digest(), mind.report().clone()));
         self.accept(&Command::FinishRetrain { recipe: recipe.digest(), outcome });
         self.session.install(mind.clone());
         self.minds.push(mind.clone());
@@ -136,9 +136,4 @@ impl<D: Domain> Diary<D> {
         }
         store
     }
-}
-
-pub fn report(mind: &Mind) -> Report {
-    let learning::Report { exemplars, threshold, figures } = mind.report().clone();
-    Report { exemplars, threshold, figures }
 }

@@ -12,7 +12,8 @@ use apprentice::language::{
 use apprentice::learning::Recipe;
 use apprentice::service::{Config, Data};
 use apprentice::world::{
-    Domain, Edition, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
+    Edition, Features, Infeasible, Lexicon, Meaning, Pointing, SeedSet, Show, Stage, StageError,
+    Thing, View, Words, World, refuse_other_instances,
 };
 
 /// Bells ring until they are muted. Breaking a bell makes the world panic, for tests of how the
@@ -133,24 +134,20 @@ impl Bells {
     }
 }
 
-impl Domain for Bells {
+impl World for Bells {
     type Scene = Ringing;
     type Task = Ringing;
 
     fn id(&self) -> &'static str {
         "bells"
     }
+
     fn version(&self) -> u16 {
         1
     }
+
     fn signature(&self) -> &Signature {
         &self.signature
-    }
-    fn lexicon(&self, _: Edition) -> &Lexicon {
-        &self.lexicon
-    }
-    fn seeds(&self) -> &SeedSet {
-        &self.seeds
     }
 
     /// A task is the bells that must ring, like `Brass Glass`. At first all are silent.
@@ -170,48 +167,25 @@ impl Domain for Bells {
         }
     }
 
-    fn step(
+    fn step_on(
         &self,
         scene: &mut Ringing,
         _: &Ringing,
         step: &Step,
+        on: &[Option<String>],
     ) -> Result<Vec<String>, Infeasible> {
-        let bell = &step.args[0];
-        let changed = match step.operator.as_str() {
-            "RING" => scene.insert(bell.clone()),
-            "MUTE" => scene.remove(bell.as_str()),
-            _ => panic!("the bell broke"),
-        };
-        match changed {
-            true => Ok(vec![bell.to_string()]),
-            false => {
-                let reason = format!("the {bell} bell is so already");
-                Err(Infeasible::because(reason))
-            }
-        }
+        refuse_other_instances(scene, step, on, |scene| act(scene, step))
     }
 
     fn achieved(&self, scene: &Ringing, task: &Ringing) -> bool {
         scene == task
     }
+
     fn plan(&self, _: &Ringing, task: &Ringing) -> Option<Program> {
         let ring = |bell: &Symbol| Step { operator: "RING".into(), args: vec![bell.clone()] };
         Some(Program { steps: task.iter().map(ring).collect() })
     }
-    fn resolve(&self, _: Edition, _: &Ringing, mention: &Mention) -> Vec<Symbol> {
-        mention.types.clone()
-    }
-    fn held(&self, _: &Ringing) -> Option<Symbol> {
-        None
-    }
-    fn feature_count(&self) -> usize {
-        1
-    }
-    fn features(&self, scene: &Ringing, _: &Program) -> Vec<f32> {
-        assert!(!self.brittle, "the world is brittle");
-        self.gate.iter().for_each(|gate| gate.pass());
-        vec![scene.len() as f32 / 3.0]
-    }
+
     fn digest(&self, scene: &Ringing) -> Digest {
         let fickle = self.fickle.iter().filter(|fickle| fickle.is_on.load(Ordering::SeqCst));
         let asked: Vec<u64> =
@@ -221,13 +195,80 @@ impl Domain for Bells {
             asked => Digest::of(format!("{scene:?} {asked:?}").as_bytes()),
         }
     }
+}
+
+impl Words for Bells {
+    fn lexicon(&self, _: Edition) -> &Lexicon {
+        &self.lexicon
+    }
+
+    fn seeds(&self) -> &SeedSet {
+        &self.seeds
+    }
+
+    fn resolve(&self, _: Edition, _: &Ringing, mention: &Mention) -> Vec<Symbol> {
+        mention.types.clone()
+    }
+
+    fn present(&self, _: &Ringing) -> BTreeSet<Symbol> {
+        BELLS.map(Symbol::new).into()
+    }
+
+    fn held(&self, _: &Ringing) -> Option<Symbol> {
+        None
+    }
+
+    fn here(&self, _: &Ringing) -> Option<Symbol> {
+        None
+    }
+
+    fn fits(&self, _: &Symbol, _: usize, _: &Symbol) -> bool {
+        true
+    }
+
+    fn contradiction(&self, _: &Ringing, _: &[String], _: &Program) -> Option<(usize, String)> {
+        None
+    }
+
+    fn is_on(&self, _: &Ringing, _: &Step) -> bool {
+        false
+    }
+
+    fn unlike(&self, _: &Ringing, _: &Symbol, _: &str) -> bool {
+        false
+    }
+
+    fn choose(&self, _: &Ringing, _: &Symbol, _: &Pointing) -> Result<Option<String>, String> {
+        Ok(None)
+    }
+
+    fn is_instance_word(&self, _: &str) -> bool {
+        false
+    }
+}
+
+impl Features for Bells {
+    fn feature_count(&self) -> usize {
+        1
+    }
+
+    fn features(&self, scene: &Ringing, _: &Program) -> Vec<f32> {
+        assert!(!self.brittle, "the world is brittle");
+        self.gate.iter().for_each(|gate| gate.pass());
+        vec![scene.len() as f32 / 3.0]
+    }
+}
+
+impl Show for Bells {
     fn goal(&self, task: &Ringing) -> String {
         let bells: Vec<&str> = task.iter().map(Symbol::as_str).collect();
         format!("let ring: {}", bells.join(", "))
     }
+
     fn progress(&self, scene: &Ringing, task: &Ringing) -> Vec<(String, bool)> {
         task.iter().map(|bell| (bell.to_string(), scene.contains(bell))).collect()
     }
+
     fn look(&self, scene: &Ringing) -> View {
         let thing = |kind: &&str| Thing {
             name: (*kind).to_owned(),
@@ -238,7 +279,25 @@ impl Domain for Bells {
         };
         View { summary: Vec::new(), things: BELLS.iter().map(thing).collect() }
     }
+
     fn narrate(&self, step: &Step, binding: &[String]) -> String {
         format!("{} {}", step.operator.as_str().to_lowercase(), binding.join(" "))
+    }
+}
+
+/// Carries one primitive out. It changes nothing when it refuses.
+fn act(scene: &mut Ringing, step: &Step) -> Result<Vec<String>, Infeasible> {
+    let bell = &step.args[0];
+    let changed = match step.operator.as_str() {
+        "RING" => scene.insert(bell.clone()),
+        "MUTE" => scene.remove(bell.as_str()),
+        _ => panic!("the bell broke"),
+    };
+    match changed {
+        true => Ok(vec![bell.to_string()]),
+        false => {
+            let reason = format!("the {bell} bell is so already");
+            Err(Infeasible::because(reason))
+        }
     }
 }

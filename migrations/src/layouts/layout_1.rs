@@ -20,8 +20,11 @@ const PIECE: usize = 4;
 /// A mind in layout 1.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SealedMind {
+    /// The key of the person's stream.
     pub stream: [u8; 16],
+    /// Of the mind's bytes.
     pub digest: [u8; 32],
+    /// Nonce, then the sealed bytes.
     pub sealed: Vec<u8>,
 }
 

@@ -1,3 +1,3 @@
-//! Data directories as released. Layout 2 is the present one.
+//! Data directories as released. Layout 2 is the current one.
 
 pub mod layout_1;

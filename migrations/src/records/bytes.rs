@@ -4,7 +4,10 @@ use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
 /// 32 bytes, stored as MessagePack `bin`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Digest(pub [u8; 32]);
+pub struct Digest(
+    /// The bytes.
+    pub [u8; 32],
+);
 
 impl<'de> Deserialize<'de> for Digest {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Digest, D::Error> {

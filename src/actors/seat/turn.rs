@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::{Effect, Seat, Stage};
 use crate::actors::defect::defect;
 use crate::client::{ErrorCode, Phase, Reply, Response, Told, Waited};
-use crate::events::{Record, Report};
+use crate::events::Record;
 use crate::ids::{Digest, RequestId, Timestamp};
-use crate::learning::{self, Mind};
+use crate::learning::Mind;
 use crate::sabotage;
 use crate::session::{Command, Divergence, Proposed, Session, Turn};
 use crate::store::{AppendError, Durable};
@@ -259,10 +259,9 @@ impl<D: Domain, C> Seat<D, C> {
     ) {
         self.training = false;
         let outcome = outcome.map(|mind| {
-            let learning::Report { exemplars, threshold, figures } = mind.report().clone();
-            let digest = mind.digest();
+            let found = (mind.digest(), mind.report().clone());
             self.effects.push(Effect::Remember(mind));
-            (digest, Report { exemplars, threshold, figures })
+            found
         });
         let command = Command::FinishRetrain { recipe, outcome };
         self.perform(Work { command, request: fresh, at, caller: None }, fresh);

@@ -10,7 +10,7 @@ use apprentice::learning::{Mind, train};
 use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session, reply_of};
 use apprentice::store::SeededEntropy;
 use apprentice::world::household::{Household, Kind};
-use apprentice::world::{Domain, StageError};
+use apprentice::world::{StageError, World};
 
 use super::scenes::{pick, said, stage};
 use apprentice_testkit::chance::below;

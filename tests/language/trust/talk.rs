@@ -14,7 +14,7 @@ use apprentice::language::{Answer, Outcome, Program, Step, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::session::{Command, Proposed, Rejection, Session, Turn, reply_of};
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage, View};
+use apprentice::world::{Show, Stage, View, World};
 
 use apprentice_testkit::recorded::recorded;
 

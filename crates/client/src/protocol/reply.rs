@@ -1,6 +1,6 @@
 use apprentice_core::ids::{Digest, Seq};
-use apprentice_core::language::{Answer, Program};
-use apprentice_core::outcomes::{Ending, Report};
+use apprentice_core::language::{Answer, Program, Report};
+use apprentice_core::outcomes::Ending;
 use serde::{Deserialize, Serialize};
 
 /// What a command led to. Computed from the recorded events alone, so a repeated request gets the

@@ -1,6 +1,8 @@
-/// A bucket of tokens: it holds `burst` of them, gains `per_second`, and each use takes some. The
-/// times are the caller's, in microseconds since any moment it likes; one that goes back counts as
-/// no time passed. Rate and size are given at each use, so that a changed quota holds at once.
+/// A bucket of tokens: it holds `burst` of them, gains `per_second`, and each use takes some.
+///
+/// The caller gives the time, in microseconds since a moment of its choice. A time before the last
+/// one counts as no time passed. Rate and size are given at each use, so a changed quota holds
+/// immediately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Bucket {
     /// Millionths of a token that are missing.
@@ -14,8 +16,8 @@ pub const TOKEN: u64 = 1_000_000;
 impl Bucket {
     /// Takes `cost` millionths of a token.
     ///
-    /// - errors: they are not there; the microseconds after which they will be, [`u64::MAX`] when
-    ///   that is never.
+    /// - errors: there are too few: the microseconds after which there are enough, [`u64::MAX`] for
+    ///   never.
     pub fn take(&mut self, now_us: u64, per_second: u32, burst: u32, cost: u64) -> Result<(), u64> {
         // A token's millionths per microsecond are the tokens per second.
         let gained = now_us.saturating_sub(self.at_us).saturating_mul(u64::from(per_second));

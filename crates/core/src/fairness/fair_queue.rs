@@ -2,8 +2,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use crate::ids::TenantId;
 
-/// A queue in which tenants take turns: each tenant's jobs stay in their order, and whoever has
-/// many waits behind their own jobs, not others behind theirs.
+/// A queue in which tenants take turns. The jobs of one tenant stay in their order. A tenant with
+/// many jobs delays its own jobs and not those of others.
 #[derive(Debug)]
 pub struct FairQueue<J> {
     lanes: BTreeMap<TenantId, VecDeque<J>>,
@@ -18,6 +18,7 @@ impl<J> Default for FairQueue<J> {
 }
 
 impl<J> FairQueue<J> {
+    /// Adds a job behind the other jobs of its tenant.
     pub fn push(&mut self, tenant: &TenantId, job: J) {
         match self.lanes.get_mut(tenant) {
             Some(lane) => lane.push_back(job),
@@ -40,10 +41,12 @@ impl<J> FairQueue<J> {
         Some(job)
     }
 
+    /// Whether no job waits.
     pub fn is_empty(&self) -> bool {
         self.order.is_empty()
     }
 
+    /// How many jobs wait, of all tenants.
     pub fn len(&self) -> usize {
         self.lanes.values().map(VecDeque::len).sum()
     }

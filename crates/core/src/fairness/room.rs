@@ -3,9 +3,9 @@ use std::collections::BTreeMap;
 use crate::ids::TenantId;
 use crate::invariants::Invariant;
 
-/// Room that tenants share, none of whom may take what others need: a tenant may take as much as
-/// it leaves free. One alone gets `most`, which is half of what there is; of two that want all,
-/// each gets a third of it, and so on; so there is always some for one more.
+/// Room that tenants share: a tenant may take as much as it leaves free. One tenant alone gets
+/// `most`, which is half of the room. Two that want everything get a third of the room each, three
+/// a quarter each, and so on. So a new tenant always finds some.
 #[derive(Debug)]
 pub struct Room {
     most: usize,
@@ -14,13 +14,17 @@ pub struct Room {
 }
 
 impl Room {
+    /// An empty room.
+    ///
+    /// - `most`: what one tenant alone may take; the room is twice as large. The unit is the
+    ///   caller's.
     pub fn new(most: usize) -> Room {
         Room { most, total: 0, held: BTreeMap::new() }
     }
 
     /// Takes `amount` for a tenant.
     ///
-    /// - returns: whether it was there.
+    /// - returns: whether there was enough; if not, nothing is taken.
     pub fn take(&mut self, tenant: &TenantId, amount: usize) -> bool {
         let held = self.held_by(tenant).saturating_add(amount);
         let total = self.total.saturating_add(amount);
@@ -54,10 +58,12 @@ impl Room {
         most.saturating_sub(self.held_by(tenant)) / 2
     }
 
+    /// What a tenant holds now.
     pub fn held_by(&self, tenant: &TenantId) -> usize {
         self.held.get(tenant).copied().unwrap_or(0)
     }
 
+    /// What all tenants hold together now.
     pub fn total(&self) -> usize {
         self.total
     }

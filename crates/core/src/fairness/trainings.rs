@@ -9,7 +9,7 @@ use crate::ids::{StreamId, StreamKey, TenantId, WithinTenant};
 ///   and for one training of each other such tenant, however many others have queued.
 /// - A person has at most one training running and one waiting. A newer one takes the place of the
 ///   one that waits: only the newest lessons count.
-/// - Within a tenant, people are served in the order of their coming.
+/// - Within a tenant, people are served in the order in which they came.
 #[derive(Debug)]
 pub struct Trainings<J> {
     /// Trainings at once.
@@ -26,8 +26,8 @@ struct Lane<J> {
     jobs: WithinTenant<J>,
 }
 
-/// What a tenant had of the trainers. Kept for every tenant that ever trained, so that nobody gains
-/// by coming and going; tenants are few, and made by the operator alone.
+/// How a tenant used the trainers. Kept for every tenant that ever trained, so that leaving and
+/// coming back gains nothing. Tenants are few, and only the operator makes them.
 #[derive(Debug, Default, Clone, Copy)]
 struct Served {
     running: usize,
@@ -35,6 +35,9 @@ struct Served {
 }
 
 impl<J> Trainings<J> {
+    /// No trainings yet.
+    ///
+    /// - `trainers`: how many trainings run at once; 0 counts as 1.
     pub fn new(trainers: usize) -> Trainings<J> {
         Trainings {
             trainers: trainers.max(1),
@@ -47,8 +50,9 @@ impl<J> Trainings<J> {
 
     /// Queues a training, unless `waiting_max` of its tenant wait already.
     ///
-    /// - returns: the one that this person had waiting, whose place it took.
-    /// - errors: the job again; there is no place.
+    /// - returns: the training of this person that waited, if there was one; the new one takes its
+    ///   place.
+    /// - errors: the job itself, when there is no place.
     pub fn push(&mut self, stream: &StreamId, job: J, waiting_max: usize) -> Result<Option<J>, J> {
         if let Some(lane) = self.waiting.get_mut(&stream.tenant)
             && let Some(former) = lane.jobs.get_mut(&stream.key)
@@ -104,7 +108,7 @@ impl<J> Trainings<J> {
         }
     }
 
-    /// Takes out everything that waits: there is no trainer any more.
+    /// Takes out all waiting trainings, for when the trainers are gone.
     pub fn clear(&mut self) -> Vec<J> {
         let lanes = std::mem::take(&mut self.waiting);
         lanes.into_values().flat_map(|lane| lane.jobs.into_values()).collect()
@@ -122,7 +126,8 @@ impl<J> Trainings<J> {
 }
 
 impl<J> Lane<J> {
-    /// The place of the first person of whom nothing runs: at most as far back as trainings run.
+    /// The place of the first person without a running training. It looks past at most as many
+    /// people as there are running trainings.
     fn first_idle(&self, tenant: &TenantId, running: &BTreeSet<StreamId>) -> Option<usize> {
         let idle =
             |key: &StreamKey| !running.contains(&StreamId { tenant: tenant.clone(), key: *key });

@@ -4,16 +4,18 @@ use serde::{Deserialize, Serialize};
 
 use super::{LiftedProgram, LiftedUtterance, Program, Symbol};
 
-/// What came of one utterance, and why: everything a person, an auditor or a simulated teacher may
-/// ask about it later.
+/// What came of one utterance, and why. A person, an auditor or a simulated teacher may ask for any
+/// of it later.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
+    /// What was done.
     pub outcome: Outcome,
+    /// Why.
     pub evidence: Evidence,
     /// The type that the last mention meant: what a later "it" means while the hand is empty.
     pub mentioned: Option<Symbol>,
-    /// Per step and argument the thing that words chose ("mug 2", "the other one"). Empty when they
-    /// chose none; where it is, the world chooses, now and whenever the record is read.
+    /// Per step and argument the thing that words chose ("mug 2", "the other one"). Empty when
+    /// words chose none; then the world chooses, now and at every replay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub chosen: Vec<Vec<Option<String>>>,
 }
@@ -24,14 +26,14 @@ impl Answer {
         self.chosen.get(step).map_or(&[], Vec::as_slice)
     }
 
-    /// Whether somebody asked for something to be done now. What is asked, told or forbidden is not
-    /// there to be taught.
+    /// Whether the utterance is a request for something to be done now. Only a request can be
+    /// taught: no question, no statement, no prohibition.
     pub fn asks(&self) -> bool {
         self.evidence.mood.is_none()
     }
 
-    /// Whether a part that answers whatever is said gave the program, or some of it, for words that
-    /// it was never taught.
+    /// Whether the program, or part of it, was a guess: it came from a network that answers
+    /// everything, for words that nobody taught it.
     pub fn guessed(&self) -> bool {
         let Evidence { lifted, nearest, answered_by, .. } = &self.evidence;
         let taught = |clause: &LiftedUtterance| nearest.iter().any(|near| near.exemplar == *clause);
@@ -40,13 +42,26 @@ impl Answer {
     }
 }
 
+/// What was done about an utterance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The program was carried out. `bindings[i]` names the things that step `i` acted on.
-    Understood { program: Program, bindings: Vec<Vec<String>> },
-    /// The words were known and the world forbids it: nothing was carried out. `step` is 0-based.
-    Impossible { program: Program, step: u32, reason: String },
+    /// The program was carried out.
+    Understood {
+        /// What was carried out.
+        program: Program,
+        /// Per step the names of the things that it acted on, one per argument.
+        bindings: Vec<Vec<String>>,
+    },
+    /// The words were understood, but the world does not allow it. Nothing was carried out.
+    Impossible {
+        /// What was understood.
+        program: Program,
+        /// The step that cannot be carried out; 0-based.
+        step: u32,
+        /// A sentence that names the object and the reason.
+        reason: String,
+    },
     /// Nothing known is close enough. Nothing was carried out.
     NotSure,
 }
@@ -58,7 +73,7 @@ pub struct Evidence {
     pub lifted: Vec<LiftedUtterance>,
     /// The nearest exemplars, nearest first, whether or not they were near enough.
     pub nearest: Vec<Near>,
-    /// The threshold that `nearest` was held against, in the same unit as its distances.
+    /// The largest distance that counts as understood, in the unit of the distances in `nearest`.
     pub threshold: f32,
     /// Candidates that were dropped, with the reason.
     pub discarded: Vec<Discarded>,
@@ -68,23 +83,24 @@ pub struct Evidence {
     /// there is no program, and for parsers that have one part only.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub answered_by: Vec<Answerer>,
-    /// Why the utterance is no request, where it is none and the recipe tells.
+    /// Why the utterance is not a request; none for a request, and for recipes that do not look.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mood: Option<Mood>,
-    /// What each word was used for, in the order of the words; of the answer that was told, or of
-    /// the nearest one that left words over. Empty where the recipe does not account for words.
+    /// What each word was used for, in the order of the words: in the answer given, or else in the
+    /// nearest reading that left words unused. Empty where the recipe does not account for words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub accounting: Vec<Accounted>,
 }
 
 impl Evidence {
-    /// The words that the answer would have passed over: why it is *not sure*.
+    /// The words that had no use. An answer with such a word is *not sure*.
     pub fn left_over(&self) -> impl Iterator<Item = &str> {
         let unused = self.accounting.iter().filter(|word| word.used == Use::Nothing);
         unused.map(|word| word.word.as_str())
     }
 
-    /// Which words make the utterance no request, or were used for nothing: `a question: "did"`.
+    /// Why the words are not a request, or which words had no use: `a question: "did"`. None when
+    /// neither holds.
     pub fn passed_over(&self) -> Option<String> {
         if let Some(mood) = &self.mood {
             let (what, word) = match mood {
@@ -102,27 +118,38 @@ impl Evidence {
     }
 }
 
-/// Why an utterance is no request for something to be done now. Each names the words that say so.
+/// Why an utterance is not a request for something to be done now.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mood {
+    /// It is a question.
     Asked {
+        /// The words that show it: `did`.
         word: String,
     },
+    /// It is a statement.
     Told {
+        /// The words that show it.
         word: String,
     },
+    /// It is a prohibition.
     Forbidden {
+        /// The words that show it: `do not`.
         word: String,
     },
+    /// It holds under a condition only.
     Conditional {
+        /// The words that show it: `if`.
         word: String,
     },
+    /// It is for later.
     Later {
+        /// The words that show it.
         word: String,
     },
-    /// What comes first in it is to be done last.
+    /// What it names first is to be done last.
     Reordered {
+        /// The words that show it.
         word: String,
     },
 }
@@ -130,7 +157,9 @@ pub enum Mood {
 /// A word or phrase of an utterance, and what it was used for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Accounted {
+    /// As it was said, lower-cased.
     pub word: String,
+    /// What it was used for.
     #[serde(rename = "as")]
     pub used: Use,
 }
@@ -151,16 +180,18 @@ pub enum Use {
     Landmark,
     /// Order, articles, prepositions and other words that ask for nothing.
     Harmless,
-    /// Nothing: the reading passes it over, so it is not taken.
+    /// Nothing. A reading that has no use for a word is not taken.
     Nothing,
 }
 
-/// A part of a parser that answers by itself: in the paper's baseline a grammar answers first, else
-/// a network, and a study counts which (paper: 713 of 793 parses were the grammar's).
+/// The part of a parser that gave an answer. In the paper's baseline a grammar answers where it can
+/// and a network otherwise; a study counts which (paper: 713 of 793 parses were the grammar's).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answerer {
+    /// Rules over words.
     Grammar,
+    /// A network that writes the program symbol by symbol. It answers everything.
     Seq2seq,
 }
 
@@ -173,9 +204,12 @@ impl fmt::Display for Answerer {
     }
 }
 
+/// An exemplar that came close to an utterance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Near {
+    /// Its words.
     pub exemplar: LiftedUtterance,
+    /// What its words mean.
     pub program: LiftedProgram,
     /// No unit; smaller is nearer.
     pub distance: f32,
@@ -183,8 +217,10 @@ pub struct Near {
     pub number: u32,
 }
 
+/// A candidate program that was dropped.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Discarded {
+    /// With the things of the scene filled in.
     pub program: Program,
     /// A sentence that names the object and the reason.
     pub reason: String,

@@ -1,19 +1,20 @@
 use super::{LiftedUtterance, Mention, Word};
 
-/// One clause as the parser gets it: its lifted form, and what lifting took away.
+/// One clause as the parser gets it: its lifted form, and what lifting removed.
 ///
-/// Parsers that compare lifted forms alone read only [`Clause::lifted`]; the rest is for those
-/// that judge by more (the swallowed words of "the *red* mug", the objects' own names).
+/// Some parsers read only [`Clause::lifted`]. Others also look at what was removed: the dropped
+/// words of "the *red* mug", and the names of the objects.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Clause {
+    /// The words, with a slot for each mention.
     pub lifted: LiftedUtterance,
-    /// Per slot, the words before its name that lifting swallowed, in order; often empty.
+    /// Per slot, the words before its name that lifting dropped, in order; often empty.
     pub attributes: Vec<Vec<String>>,
     /// The words as said, lower-cased, without clause marks.
     pub words: Vec<String>,
     /// What the slots stand for, in order.
     pub mentions: Vec<Mention>,
-    /// Before which of the lifted words a clause mark stood, in order.
+    /// The places of the lifted words that had a clause mark before them; 0-based, in order.
     pub marks: Vec<usize>,
 }
 
@@ -26,7 +27,8 @@ impl Clause {
 
     /// A clause of some of this one's lifted words.
     ///
-    /// - `places`: in rising order; what was said for a slot is its attributes and its name.
+    /// - `places`: 0-based, in rising order. A slot brings its attributes, its mention and its
+    ///   name.
     pub fn pick(&self, places: &[usize]) -> Clause {
         let mut out = Clause::default();
         let mut slot = 0;

@@ -1,10 +1,11 @@
 use super::{Clause, Word, WordLists};
 
-/// Where clauses begin and which word is a clause's verb: as much grammar as single words tell.
+/// Finds where clauses begin and which word is a clause's verb, by single words alone.
 #[derive(Debug, Clone, Copy)]
 pub struct Grammar<'a> {
+    /// The recipe's lists.
     pub lists: &'a WordLists,
-    /// The domain's; no adjective is a verb.
+    /// The lexicon's adjectives. None of them is ever a verb.
     pub adjectives: &'a [String],
 }
 
@@ -13,9 +14,9 @@ pub struct Grammar<'a> {
 pub struct Verb {
     /// Its base form.
     pub word: String,
-    /// The particle that belongs to it, or nothing.
+    /// The particle that belongs to it; empty for none.
     pub particle: String,
-    /// Its place among the clause's words.
+    /// Its place among the clause's lifted words; 0-based.
     pub at: usize,
 }
 
@@ -23,6 +24,7 @@ pub struct Verb {
 const PARTICLE_WITHIN: usize = 5;
 
 impl Grammar<'_> {
+    /// Whether the word is an adjective of the lexicon.
     pub fn is_adjective(&self, word: &str) -> bool {
         self.adjectives.iter().any(|adjective| adjective == word)
     }
@@ -56,8 +58,8 @@ impl Grammar<'_> {
         Some(Verb { word: lists.base(verb), particle, at })
     }
 
-    /// The clauses of an utterance: cut at marks and joining words, but only where a verb follows,
-    /// so "on the left" and "and the spoon" never open one. Phrases that only say how things stand
+    /// The clauses of an utterance. It is cut at marks and joining words where a verb follows, so
+    /// "on the left" and "and the spoon" never begin a clause. Phrases that only describe a state
     /// ("while holding the card") are left out.
     pub fn cut(&self, whole: &Clause) -> Vec<Clause> {
         let lists = self.lists;

@@ -2,8 +2,9 @@ use std::collections::BTreeMap;
 
 use super::Symbol;
 
-/// How often recorded people used a word in a clause that meant each operator: what is known about
-/// a language before anybody taught anything. Counts of single words, no sentences.
+/// How often recorded people used a word in a clause that meant each operator. This is what is
+/// known about a language before anybody has taught anything. It counts single words and holds no
+/// sentences.
 ///
 /// `V:` marks a clause's main verb; `V:pick_up` is a verb with its particle, `V:take+from` a verb
 /// with a function word after its object, `n:2` the number of things named.
@@ -13,11 +14,13 @@ pub struct Habits {
     pub order: Vec<Symbol>,
     /// Clauses per operator.
     pub clauses: Vec<u32>,
+    /// Per word, how many clauses of each operator have it.
     pub words: BTreeMap<String, Vec<u32>>,
 }
 
 impl Habits {
-    /// Per operator; none for a word that nobody used.
+    /// How many clauses of each operator have the word, in the order of [`Habits::order`]; none for
+    /// a word that nobody used.
     pub fn counts(&self, word: &str) -> Option<&[u32]> {
         self.words.get(word).map(Vec::as_slice)
     }
@@ -31,8 +34,8 @@ impl Habits {
     }
 }
 
-/// Which of a domain's operators play a part that the choice of arguments depends on. A domain
-/// that names none has its programs filled in the order of the slots.
+/// The operators of a world that the choice of arguments depends on. In a world that names none,
+/// programs are filled in the order of their slots.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Roles {
     /// Going to its argument.
@@ -41,24 +44,27 @@ pub struct Roles {
     pub taking: Option<Symbol>,
     /// Putting what is in the hand (first argument) in or on a place (second).
     pub putting: Option<Symbol>,
-    /// Getting at what is in its argument, or shutting it away.
+    /// Opening or shutting its argument.
     pub doors: Vec<Symbol>,
 }
 
 impl Roles {
+    /// Whether the operator goes to its argument.
     pub fn goes(&self, operator: &Symbol) -> bool {
         self.going.as_ref() == Some(operator)
     }
 
+    /// Whether the operator takes its argument into the hand.
     pub fn takes(&self, operator: &Symbol) -> bool {
         self.taking.as_ref() == Some(operator)
     }
 
+    /// Whether the operator puts its first argument in or on its second.
     pub fn puts(&self, operator: &Symbol) -> bool {
         self.putting.as_ref() == Some(operator)
     }
 
-    /// Working its argument, as a switch is worked: none of the other parts.
+    /// Whether the operator has none of these roles: it works its argument, as a switch is worked.
     pub fn works(&self, operator: &Symbol) -> bool {
         !self.goes(operator)
             && !self.takes(operator)
@@ -66,6 +72,7 @@ impl Roles {
             && !self.is_door(operator)
     }
 
+    /// Whether the operator opens or shuts its argument.
     pub fn is_door(&self, operator: &Symbol) -> bool {
         self.doors.contains(operator)
     }

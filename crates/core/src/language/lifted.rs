@@ -9,11 +9,13 @@ use super::{Program, ProgramError, Step, Symbol};
 /// One word of a lifted utterance: a plain word, or the place of a mention.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Word {
+    /// A plain word, lower-case.
     Text(String),
-    /// The `n`-th slot of an utterance is its `n`-th mention. `fixture` keeps the word of a typed
-    /// fixture ("sink", "fridge") where the recipe wants it.
+    /// A mention: the `n`-th slot of an utterance is its `n`-th mention.
     Slot {
+        /// The sort of what is mentioned.
         sort: Symbol,
+        /// The word for a fixture ("sink", "fridge"), where the recipe keeps it.
         fixture: Option<String>,
     },
 }
@@ -24,10 +26,12 @@ pub enum Word {
 /// no number.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct LiftedUtterance {
+    /// In the order of the utterance.
     pub words: Vec<Word>,
 }
 
 impl LiftedUtterance {
+    /// How many mentions it has.
     pub fn slots(&self) -> usize {
         self.words.iter().filter(|word| matches!(word, Word::Slot { .. })).count()
     }
@@ -81,33 +85,44 @@ impl<'de> Deserialize<'de> for LiftedUtterance {
     }
 }
 
-/// Words that name something: "the coffee mug", "it".
+/// Words of an utterance that name a thing: "the coffee mug", "it".
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mention {
     /// The name as said, lower-cased, without what surrounds it: `coffee mug`.
     pub surface: String,
+    /// The sort of its types; of a pronoun, the usual sort.
     pub sort: Symbol,
     /// The types this name may mean, likeliest first; empty for a pronoun.
     pub types: Vec<Symbol>,
+    /// Whether it is a pronoun: "it".
     pub pronoun: bool,
+    /// Whether it is a plural: "the mugs".
     pub plural: bool,
 }
 
 /// An argument of a lifted step.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LiftedArg {
-    /// Whatever the `number`-th mention of the utterance means; numbers start at 1.
-    Slot { sort: Symbol, number: u8 },
-    /// Whatever the robot holds when the program starts.
+    /// What a mention of the utterance means.
+    Slot {
+        /// The sort of the mention.
+        sort: Symbol,
+        /// Which mention; from 1.
+        number: u8,
+    },
+    /// What the robot holds when the program starts.
     Held,
     /// A type that the utterance did not mention: "wash the mug" keeps its `SinkBasin`.
     Constant(Symbol),
 }
 
+/// A step with slots: `PUT <obj:1> <obj:2>`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LiftedStep {
+    /// The primitive.
     pub operator: Symbol,
+    /// In the order of the operator's signature.
     pub args: Vec<LiftedArg>,
 }
 
@@ -115,6 +130,7 @@ pub struct LiftedStep {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LiftedProgram {
+    /// In the order in which they run.
     pub steps: Vec<LiftedStep>,
 }
 
@@ -129,9 +145,11 @@ impl LiftedProgram {
         args.map(number).max().unwrap_or(0)
     }
 
-    /// Fills slots with `mentioned` (by slot number) and `<held>` with `held`.
+    /// The program with each slot filled by its mention, and `<held>` by what the robot holds.
     ///
-    /// - returns: `None` when a slot has no mention, or `<held>` is asked of an empty hand.
+    /// - `mentioned`: the type that each mention means, in order.
+    /// - returns: none when a slot has no mention, or the program has `<held>` and the hand is
+    ///   empty.
     pub fn fill(&self, mentioned: &[Symbol], held: Option<&Symbol>) -> Option<Program> {
         let fill_arg = |arg: &LiftedArg| match arg {
             LiftedArg::Slot { number, .. } => mentioned.get(*number as usize - 1).cloned(),
@@ -170,7 +188,9 @@ impl LiftedProgram {
 /// A lifted utterance and the lifted program it stands for: what the parser compares with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Exemplar {
+    /// The words.
     pub utterance: LiftedUtterance,
+    /// What they mean.
     pub program: LiftedProgram,
 }
 

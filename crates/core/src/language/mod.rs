@@ -1,4 +1,5 @@
-//! What people say and what programs are, before any meaning is guessed. Domain-neutral.
+//! What people say, what programs are, and what came of an utterance. Nothing here depends on a
+//! world.
 
 mod answer;
 mod clause;
@@ -8,6 +9,7 @@ mod habits;
 mod lifted;
 mod lists;
 mod program;
+mod report;
 mod signature;
 mod symbol;
 mod utterance;
@@ -20,6 +22,7 @@ pub use habits::{Habits, Roles};
 pub use lifted::{Exemplar, LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Mention, Word};
 pub use lists::WordLists;
 pub use program::{Program, ProgramError, Step};
+pub use report::Report;
 pub use signature::{Operator, Signature};
 pub use symbol::Symbol;
 pub use utterance::{Utterance, UtteranceError, is_mark, tokens};

@@ -10,7 +10,9 @@ use crate::limits::PROGRAM_STEPS_MAX;
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Step {
+    /// The primitive.
     pub operator: Symbol,
+    /// Object types, in the order of the operator's signature.
     pub args: Vec<Symbol>,
 }
 
@@ -18,20 +20,34 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Program {
+    /// In the order in which they run.
     pub steps: Vec<Step>,
 }
 
-/// Why a text is no program.
+/// Why a text is not a program.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ProgramError {
+    /// The text has no step.
     #[error("the program is empty")]
     Empty,
+    /// There is nothing between two semicolons.
     #[error("step {step} of the program is empty")]
-    EmptyStep { step: usize },
+    EmptyStep {
+        /// Counted from 1.
+        step: usize,
+    },
+    /// There are more than [`PROGRAM_STEPS_MAX`] steps.
     #[error("the program has {found} steps; at most {PROGRAM_STEPS_MAX} are allowed")]
-    TooLong { found: usize },
+    TooLong {
+        /// Steps found.
+        found: usize,
+    },
+    /// An argument of a lifted step is neither a name nor a slot.
     #[error("{found:?} is not a name or a slot such as <obj:1>")]
-    BadArgument { found: String },
+    BadArgument {
+        /// The argument.
+        found: String,
+    },
 }
 
 impl FromStr for Step {
@@ -51,7 +67,7 @@ impl FromStr for Program {
     }
 }
 
-/// Splits at `;` and reads each part; shared with lifted programs.
+/// Splits at `;` and reads each part, for programs and lifted programs.
 pub(super) fn parse_steps<S: FromStr<Err = ProgramError>>(
     text: &str,
 ) -> Result<Vec<S>, ProgramError> {

@@ -1,15 +1,18 @@
 use super::{Step, Symbol};
 
-/// A primitive of a domain and the sorts of its arguments.
+/// A primitive of a world and the sorts of its arguments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator {
+    /// As programs name it: `PICKUP`.
     pub name: Symbol,
+    /// One sort per argument.
     pub args: Vec<Symbol>,
 }
 
-/// The primitives of a domain.
+/// The primitives of a world.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signature {
+    /// In no particular order.
     pub operators: Vec<Operator>,
 }
 

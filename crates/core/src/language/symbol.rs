@@ -4,16 +4,18 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-/// A name of the domain: an operator (`PICKUP`), an object type (`Mug`), a sort (`obj`).
+/// A name of a world: an operator (`PICKUP`), an object type (`Mug`), a sort (`obj`).
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Symbol(Arc<str>);
 
 impl Symbol {
+    /// The symbol with this name.
     pub fn new(text: &str) -> Symbol {
         Symbol(Arc::from(text))
     }
 
+    /// The name.
     pub fn as_str(&self) -> &str {
         &self.0
     }

@@ -10,23 +10,34 @@ use crate::plain::{self, Hidden};
 #[serde(try_from = "String", into = "String")]
 pub struct Utterance(String);
 
-/// Why a text is no utterance. A sentence for the person who typed it.
+/// Why a text is not an utterance. A sentence for the person who typed it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UtteranceError {
+    /// There is no text.
     #[error("that is empty; type what the robot should do")]
     Empty,
+    /// There are only marks and signs.
     #[error("there are no words in that; type what the robot should do")]
     NoWords,
+    /// There are more than [`UTTERANCE_BYTES_MAX`] bytes.
     #[error("that has {found} bytes; the limit is {UTTERANCE_BYTES_MAX}, so say it in parts")]
-    TooManyBytes { found: usize },
+    TooManyBytes {
+        /// Bytes found.
+        found: usize,
+    },
+    /// There are more than [`UTTERANCE_WORDS_MAX`] words.
     #[error("that has {found} words; the limit is {UTTERANCE_WORDS_MAX}, so say it in parts")]
-    TooManyWords { found: usize },
+    TooManyWords {
+        /// Words found.
+        found: usize,
+    },
+    /// There is a character that a reader cannot see.
     #[error("in that, {0}")]
     Hidden(Hidden),
 }
 
 impl Utterance {
-    /// What somebody says now. White space around the text is dropped, tabs count as blanks.
+    /// A new utterance. White space around the text is dropped; tabs count as blanks.
     ///
     /// - errors: empty, without a single word, too long in bytes or words, or with a
     ///   [hidden](plain::check) character.
@@ -34,10 +45,11 @@ impl Utterance {
         Utterance::admit(text, plain::check)
     }
 
-    /// What was recorded. Older versions refused control characters alone, and their records stay
-    /// what they are.
+    /// An utterance from a record. Older versions refused control characters alone, so their
+    /// records may have other hidden characters.
     ///
-    /// - errors: as [`Utterance::new`], and of the hidden characters those that control.
+    /// - errors: as [`Utterance::new`], but of the hidden characters only control characters are
+    ///   refused.
     pub fn recorded(text: &str) -> Result<Utterance, UtteranceError> {
         Utterance::admit(text, |text| match (1..).zip(text.chars()).find(|(_, c)| c.is_control()) {
             Some((place, found)) => Err(Hidden { found, place }),
@@ -65,6 +77,7 @@ impl Utterance {
         }
     }
 
+    /// The text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -156,7 +169,7 @@ mod tests {
         let wordy = "go ".repeat(200);
         assert!(matches!(Utterance::new(&wordy), Err(UtteranceError::TooManyWords { found: 200 })));
         assert!(Utterance::new("wash the <b>mug</b> 🍵").is_ok());
-        // Recorded by older versions, and read for ever.
+        // Older versions recorded it, so every version reads it.
         assert!(Utterance::recorded("pick\u{202e}up").is_ok());
         assert_eq!(Utterance::recorded("a\u{1b}b"), hidden('\u{1b}', 2));
     }

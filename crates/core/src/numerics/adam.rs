@@ -6,11 +6,13 @@ use super::lanes::{Lanes, One, dispatch};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdamSettings {
+    /// How far a step goes.
     pub learning_rate: f32,
     /// Memory of the gradient's mean, between 0 and 1.
     pub beta1: f32,
     /// Memory of the gradient's square, between 0 and 1.
     pub beta2: f32,
+    /// Added to the divisor, so that it is never zero.
     pub epsilon: f32,
     /// Share of each parameter taken away per step and unit of learning rate (decoupled).
     pub weight_decay: f32,
@@ -40,6 +42,9 @@ pub struct Adam {
 }
 
 impl Adam {
+    /// An optimiser before its first step.
+    ///
+    /// - `parameters`: how many there are.
     pub fn new(parameters: usize, settings: AdamSettings) -> Adam {
         let zeros = vec![0.0; parameters];
         Adam { settings, mean: zeros.clone(), square: zeros, decay1: 1.0, decay2: 1.0 }
@@ -73,7 +78,8 @@ impl Adam {
             mean: self.mean.as_mut_ptr(),
             square: self.square.as_mut_ptr(),
         };
-        // All four lists have `count` numbers: two were checked, two were made so.
+        // SAFETY: all four lists have `count` numbers: two were checked, `new` made the other two
+        // so.
         unsafe { run(step, lists) }
     }
 }
@@ -99,9 +105,13 @@ struct Lists {
 
 dispatch!(run, all, (step: Step, lists: Lists));
 
+/// # Safety
+/// The machine has the instruction set of `L`. The lists are valid for reads of `count` numbers,
+/// and all but the gradient for writes.
 #[inline(always)]
 unsafe fn all<L: Lanes>(step: Step, lists: Lists) {
     let mut at = 0;
+    // SAFETY: before each call, at least as many numbers are left as it touches.
     unsafe {
         while lists.count - at >= L::WIDTH {
             some::<L>(step, lists, at);
@@ -114,8 +124,13 @@ unsafe fn all<L: Lanes>(step: Step, lists: Lists) {
     }
 }
 
+/// The step of the `L::WIDTH` parameters from `at` on.
+///
+/// # Safety
+/// As [`all`], with `at + L::WIDTH <= count`.
 #[inline(always)]
 unsafe fn some<L: Lanes>(step: Step, lists: Lists, at: usize) {
+    // SAFETY: all places are below `count`.
     unsafe {
         let slope = L::load(lists.gradient.add(at));
         let moved = |old, beta, fresh, new| {

@@ -1,24 +1,27 @@
 use super::lanes::{Lanes, One, dispatch};
 
-/// eˣ, relative error below 2e-7. Below −87 and above 88 it stays at the value there, so that no
-/// result is infinite, zero or denormal (denormals are slow).
+/// eˣ, relative error below 2e-7. For x below −87 or above 88 it is the value at that limit, so
+/// that no result is infinite, zero or denormal (denormals are slow).
 pub fn exp(x: f32) -> f32 {
-    // One lane needs no instruction set.
+    // SAFETY: one lane needs no instruction set.
     unsafe { exp_lanes::<One>(x) }
 }
 
-/// [`exp`] of every entry, the same bits.
+/// Replaces every entry by its [`exp`], with the same bits.
 pub fn exp_all(x: &mut [f32]) {
+    // SAFETY: the pointer and the length are those of one slice.
     unsafe { exp_each(x.as_mut_ptr(), x.len()) }
 }
 
 /// 1 / (1 + e⁻ˣ), strictly between 0 and 1 while |x| < 16.
 pub fn sigmoid(x: f32) -> f32 {
+    // SAFETY: one lane needs no instruction set.
     unsafe { sigmoid_lanes::<One>(x) }
 }
 
-/// [`sigmoid`] of every entry, the same bits.
+/// Replaces every entry by its [`sigmoid`], with the same bits.
 pub fn sigmoid_all(x: &mut [f32]) {
+    // SAFETY: the pointer and the length are those of one slice.
     unsafe { sigmoid_each(x.as_mut_ptr(), x.len()) }
 }
 
@@ -27,13 +30,15 @@ pub fn ln(x: f32) -> f32 {
     libm::logf(x)
 }
 
+/// The hyperbolic tangent.
 pub fn tanh(x: f32) -> f32 {
     libm::tanhf(x)
 }
 
-/// tanh of every entry as 2σ(2x) − 1, absolute error below 2e-7: for networks, where [`tanh`] would
-/// be most of the time. Not the bits of [`tanh`].
+/// Replaces every entry by its tanh, computed as 2σ(2x) − 1: absolute error below 2e-7. Networks
+/// use it because [`tanh`] would take most of their time. Its bits are not those of [`tanh`].
 pub fn tanh_all(x: &mut [f32]) {
+    // SAFETY: the pointer and the length are those of one slice.
     unsafe { tanh_each(x.as_mut_ptr(), x.len()) }
 }
 
@@ -56,15 +61,15 @@ pub fn softmax(logits: &mut [f32]) {
     logits.iter_mut().for_each(|x| *x /= sum);
 }
 
-/// Binary cross-entropy in nats of a probability against the truth. The probability is kept 1e-7
-/// away from certainty, so that one confident error does not make a sum infinite.
+/// Binary cross-entropy of a probability against the truth, in nats. The probability of the truth
+/// counts as at least 1e-7, so that one confident error does not make a sum infinite.
 pub fn bce(probability: f32, truth: bool) -> f32 {
     let given = if truth { probability } else { 1.0 - probability };
     -ln(given.max(1e-7))
 }
 
-/// Binary cross-entropy in nats of a logit against the truth: ln(1 + e⁻ᶻ), z turned so that
-/// larger is better. The gradient by the logit is `sigmoid(logit) − truth`.
+/// Binary cross-entropy of a logit against the truth, in nats: ln(1 + e⁻ᶻ), where z is the logit if
+/// `truth` holds and its negative if not. The gradient by the logit is `sigmoid(logit) − truth`.
 pub fn bce_with_logit(logit: f32, truth: bool) -> f32 {
     let z = if truth { logit } else { -logit };
     libm::log1pf(exp(-z.abs())) + (-z).max(0.0)
@@ -75,9 +80,13 @@ dispatch!(sigmoid_each, sigmoid_body, (x: *mut f32, count: usize));
 
 dispatch!(tanh_each, tanh_body, (x: *mut f32, count: usize));
 
+/// # Safety
+/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count`
+/// numbers.
 #[inline(always)]
 unsafe fn exp_body<L: Lanes>(x: *mut f32, count: usize) {
     let mut at = 0;
+    // SAFETY: before each access, at least as many numbers are left as it touches.
     unsafe {
         while count - at >= L::WIDTH {
             L::store(x.add(at), exp_lanes::<L>(L::load(x.add(at))));
@@ -90,9 +99,13 @@ unsafe fn exp_body<L: Lanes>(x: *mut f32, count: usize) {
     }
 }
 
+/// # Safety
+/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count`
+/// numbers.
 #[inline(always)]
 unsafe fn sigmoid_body<L: Lanes>(x: *mut f32, count: usize) {
     let mut at = 0;
+    // SAFETY: before each access, at least as many numbers are left as it touches.
     unsafe {
         while count - at >= L::WIDTH {
             L::store(x.add(at), sigmoid_lanes::<L>(L::load(x.add(at))));
@@ -105,9 +118,13 @@ unsafe fn sigmoid_body<L: Lanes>(x: *mut f32, count: usize) {
     }
 }
 
+/// # Safety
+/// The machine has the instruction set of `L`; `x` is valid for reads and writes of `count`
+/// numbers.
 #[inline(always)]
 unsafe fn tanh_body<L: Lanes>(x: *mut f32, count: usize) {
     let mut at = 0;
+    // SAFETY: before each access, at least as many numbers are left as it touches.
     unsafe {
         while count - at >= L::WIDTH {
             L::store(x.add(at), tanh_lanes::<L>(L::load(x.add(at))));
@@ -120,16 +137,22 @@ unsafe fn tanh_body<L: Lanes>(x: *mut f32, count: usize) {
     }
 }
 
+/// # Safety
+/// The machine has the instruction set of `L`.
 #[inline(always)]
 unsafe fn tanh_lanes<L: Lanes>(x: L::Vector) -> L::Vector {
+    // SAFETY: the caller has the instruction set, and no pointer is used.
     unsafe {
         let half = sigmoid_lanes::<L>(L::add(x, x));
         L::sub(L::add(half, half), L::splat(1.0))
     }
 }
 
+/// # Safety
+/// The machine has the instruction set of `L`.
 #[inline(always)]
 unsafe fn sigmoid_lanes<L: Lanes>(x: L::Vector) -> L::Vector {
+    // SAFETY: the caller has the instruction set, and no pointer is used.
     unsafe {
         let power = exp_lanes::<L>(L::sub(L::splat(0.0), x));
         L::div(L::splat(1.0), L::add(L::splat(1.0), power))
@@ -138,6 +161,9 @@ unsafe fn sigmoid_lanes<L: Lanes>(x: L::Vector) -> L::Vector {
 
 /// eˣ = 2ⁿ · eʳ with |r| ≤ ln 2 / 2, eʳ by its series to the seventh power (the first term left
 /// out is below 6e-9). ln 2 is split so that n·high is exact.
+///
+/// # Safety
+/// The machine has the instruction set of `L`.
 #[inline(always)]
 unsafe fn exp_lanes<L: Lanes>(x: L::Vector) -> L::Vector {
     // Adding and taking away 1.5 · 2²³ rounds to the nearest whole number in every instruction set.
@@ -145,6 +171,7 @@ unsafe fn exp_lanes<L: Lanes>(x: L::Vector) -> L::Vector {
     const HIGH: f32 = 0.693_359_4;
     const LOW: f32 = -2.121_944_4e-4;
     const SERIES: [f32; 7] = [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
+    // SAFETY: the caller has the instruction set, and no pointer is used.
     unsafe {
         let x = L::max(L::min(x, L::splat(88.0)), L::splat(-87.0));
         let scaled = L::mul(x, L::splat(std::f32::consts::LOG2_E));

@@ -10,10 +10,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub struct Floats(pub Vec<f32>);
 
 impl Floats {
+    /// So many zeros.
     pub fn zeros(count: usize) -> Floats {
         Floats(vec![0.0; count])
     }
 
+    /// Whether no number is infinite or NaN.
     pub fn all_finite(&self) -> bool {
         self.0.iter().all(|value| value.is_finite())
     }

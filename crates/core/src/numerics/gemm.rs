@@ -3,36 +3,45 @@ use super::lanes::{Lanes, dispatch};
 /// The sizes of one product: `[rows × inner] · [inner × columns]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
+    /// Rows of the left side and of the result.
     pub rows: usize,
+    /// Columns of the left side, rows of the right side.
     pub inner: usize,
+    /// Columns of the right side and of the result.
     pub columns: usize,
 }
 
-/// What happens to what already stands where the product goes.
+/// What happens to the numbers that are where the product goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sink {
+    /// The product takes its place.
     Replace,
-    /// The product is added, term by term, to what stands there.
+    /// The product is added to them, term by term.
     Add,
 }
 
 /// `c = a · b`, all row-major: `a` is `[rows × inner]`, `b` is `[inner × columns]`.
 ///
-/// Same bits on every machine: each entry starts at 0 (or at what stands there) and adds its terms
+/// Same bits on every machine: each entry starts at 0 (or at its present number) and adds its terms
 /// for `inner = 0, 1, 2, …`, product and sum rounded separately. Lanes lie along the columns, so
-/// the width of the machine's vectors does not touch that order.
+/// the width of the machine's vectors does not change that order.
 ///
 /// - panics: a slice does not have the size that `shape` says.
 pub fn gemm(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink: Sink) {
     product(shape, a, [shape.inner, 1], b, c, sink);
 }
 
-/// `c = aᵀ · b`: like [`gemm`], with `a` stored as `[inner × rows]`.
+/// `c = aᵀ · b`: as [`gemm`], with `a` stored as `[inner × rows]`.
+///
+/// - panics: a slice does not have the size that `shape` says.
 pub fn gemm_transposed_a(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink: Sink) {
     product(shape, a, [1, shape.rows], b, c, sink);
 }
 
-/// The plain triple loop with the same order of summation: what the kernels are tested against.
+/// [`gemm`] as a plain triple loop with the same order of summation. The kernels are tested against
+/// it.
+///
+/// - panics: a slice is smaller than `shape` says.
 pub fn gemm_oracle(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink: Sink) {
     let Shape { rows, inner, columns } = shape;
     for row in 0..rows {
@@ -47,7 +56,9 @@ pub fn gemm_oracle(shape: Shape, a: &[f32], b: &[f32], c: &mut [f32], sink: Sink
     }
 }
 
-/// `out[columns × rows]` from `x[rows × columns]`.
+/// Writes `x` `[rows × columns]` as `out` `[columns × rows]`.
+///
+/// - panics: `x` does not have its size.
 pub fn transpose(rows: usize, columns: usize, x: &[f32], out: &mut Vec<f32>) {
     assert_eq!(x.len(), rows * columns, "a matrix of {rows} × {columns}");
     out.clear();
@@ -63,7 +74,7 @@ fn product(shape: Shape, a: &[f32], strides: [usize; 2], b: &[f32], c: &mut [f32
     assert_eq!(b.len(), inner * columns, "right side of {shape:?}");
     assert_eq!(c.len(), rows * columns, "result of {shape:?}");
     let task = Task { shape, strides, add: sink == Sink::Add };
-    // The three sizes were just checked.
+    // SAFETY: the three slices have the sizes that `task` says.
     unsafe { run(task, a.as_ptr(), b.as_ptr(), c.as_mut_ptr()) }
 }
 
@@ -80,17 +91,24 @@ dispatch!(run, all, (task: Task, a: *const f32, b: *const f32, c: *mut f32));
 /// Rows computed together: each loaded piece of `b` serves all of them.
 const ROWS: usize = 4;
 
+/// # Safety
+/// The machine has the instruction set of `L`. `a` and `b` are valid for reads and `c` for writes
+/// of the matrices that `task` describes.
 #[inline(always)]
 unsafe fn all<L: Lanes>(task: Task, a: *const f32, b: *const f32, c: *mut f32) {
     let Shape { rows, columns, .. } = task.shape;
     let mut row = 0;
     while row < rows {
+        // SAFETY: `row < rows`, so the row lies in the matrix.
         let a = unsafe { a.add(row * task.strides[0]) };
+        // SAFETY: as above.
         let c = unsafe { c.add(row * columns) };
         if rows - row >= ROWS {
+            // SAFETY: `ROWS` rows are left from here.
             unsafe { band::<L, ROWS, 2>(task, a, b, c) };
             row += ROWS;
         } else {
+            // SAFETY: one row is left from here.
             unsafe { band::<L, 1, 4>(task, a, b, c) };
             row += 1;
         }
@@ -98,6 +116,9 @@ unsafe fn all<L: Lanes>(task: Task, a: *const f32, b: *const f32, c: *mut f32) {
 }
 
 /// `R` rows of the result, over all columns.
+///
+/// # Safety
+/// As [`all`], with `a` and `c` at the first of `R` rows.
 #[inline(always)]
 unsafe fn band<L: Lanes, const R: usize, const V: usize>(
     task: Task,
@@ -107,6 +128,8 @@ unsafe fn band<L: Lanes, const R: usize, const V: usize>(
 ) {
     let columns = task.shape.columns;
     let mut column = 0;
+    // SAFETY: each tile is as wide as there are columns left at least; narrower lanes need an
+    // instruction set that the wider ones include.
     unsafe {
         while columns - column >= V * L::WIDTH {
             tile::<L, R, V>(task, a, b.add(column), c.add(column));
@@ -127,7 +150,11 @@ unsafe fn band<L: Lanes, const R: usize, const V: usize>(
     }
 }
 
-/// `R` rows × `V` vectors of the result, held in registers over the whole inner loop.
+/// `R` rows × `V` vectors of the result, kept in registers during the whole inner loop.
+///
+/// # Safety
+/// As [`all`], with `a` at the first of `R` rows, and `b` and `c` at a column with `V · L::WIDTH`
+/// columns left.
 #[inline(always)]
 unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
     task: Task,
@@ -136,6 +163,7 @@ unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
     c: *mut f32,
 ) {
     let columns = task.shape.columns;
+    // SAFETY: `r < R`, `k < inner` and `v < V`, so every place is in its matrix.
     unsafe {
         let mut sums = [[L::splat(0.0); V]; R];
         if task.add {

@@ -1,6 +1,6 @@
-//! One vocabulary of lane-wise operations for every instruction set. A kernel is written once over
-//! [`Lanes`] and compiled for each; since every operation is one IEEE-754 operation per lane, the
-//! results have the same bits whatever the width.
+//! The operations that kernels are written with, the same for every instruction set. A kernel is
+//! written once over [`Lanes`] and compiled for each set. Every operation is one IEEE-754 operation
+//! per lane, so the results have the same bits for every width.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -16,7 +16,7 @@ pub enum Kernel {
     Avx2 = 3,
 }
 
-// Global, yet no hidden input: whatever stands here, results are equal bit for bit.
+// Global, but not a hidden input: every value here gives the same bits.
 static FORCED: AtomicU8 = AtomicU8::new(0);
 
 impl Kernel {
@@ -44,8 +44,8 @@ impl Kernel {
         FORCED.store(kernel.map_or(0, |kernel| kernel as u8), Ordering::Relaxed);
     }
 
-    /// Runs `task` with this kernel, for tests and measurements. One caller of the process at a time,
-    /// so that each runs what it says.
+    /// Runs `task` with this kernel, for tests and measurements. Callers of one process wait for
+    /// each other.
     ///
     /// - panics: as [`Kernel::force`].
     pub fn run<T>(self, task: impl FnOnce() -> T) -> T {
@@ -57,7 +57,7 @@ impl Kernel {
         result
     }
 
-    /// What calls use now.
+    /// The kernel that calls use now.
     pub fn current() -> Kernel {
         match FORCED.load(Ordering::Relaxed) {
             1 => Kernel::Plain,
@@ -76,8 +76,8 @@ impl Kernel {
 /// `WIDTH` numbers side by side.
 ///
 /// # Safety
-/// The machine must have the instruction set, and pointers must be good for `WIDTH` numbers; they
-/// need no alignment.
+/// For every method: the machine has the instruction set of the type. For `load`, the pointer is
+/// valid for reads of `WIDTH` numbers; for `store`, for writes. It is aligned as an `f32` is.
 pub(super) trait Lanes {
     const WIDTH: usize;
     type Vector: Copy;
@@ -111,10 +111,12 @@ impl Lanes for One {
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> f32 {
+        // SAFETY: the caller's pointer is valid for reads of one number, and aligned.
         unsafe { *from }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: f32) {
+        // SAFETY: the caller's pointer is valid for writes of one number, and aligned.
         unsafe { *to = value }
     }
     #[inline(always)]
@@ -165,7 +167,7 @@ mod x86 {
          $splat:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $div:ident
          $sqrt:ident $min:ident $max:ident
          $to_whole:ident $whole:ident $add_whole:ident $shift:ident $cast:ident) => {
-            pub struct $name;
+            pub(in crate::numerics) struct $name;
 
             impl Lanes for $name {
                 const WIDTH: usize = $width;
@@ -173,46 +175,59 @@ mod x86 {
                 type Narrower = $narrower;
                 #[inline(always)]
                 unsafe fn splat(value: f32) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $splat(value) }
                 }
                 #[inline(always)]
                 unsafe fn load(from: *const f32) -> $vector {
+                    // SAFETY: the caller has the instruction set, and a pointer valid for `WIDTH`
+                    // numbers.
                     unsafe { $load(from) }
                 }
                 #[inline(always)]
                 unsafe fn store(to: *mut f32, value: $vector) {
+                    // SAFETY: the caller has the instruction set, and a pointer valid for `WIDTH`
+                    // numbers.
                     unsafe { $store(to, value) }
                 }
                 #[inline(always)]
                 unsafe fn add(a: $vector, b: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $add(a, b) }
                 }
                 #[inline(always)]
                 unsafe fn sub(a: $vector, b: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $sub(a, b) }
                 }
                 #[inline(always)]
                 unsafe fn mul(a: $vector, b: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $mul(a, b) }
                 }
                 #[inline(always)]
                 unsafe fn div(a: $vector, b: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $div(a, b) }
                 }
                 #[inline(always)]
                 unsafe fn sqrt(a: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $sqrt(a) }
                 }
                 #[inline(always)]
                 unsafe fn min(a: $vector, b: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $min(a, b) }
                 }
                 #[inline(always)]
                 unsafe fn max(a: $vector, b: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $max(a, b) }
                 }
                 #[inline(always)]
                 unsafe fn power_of_two(whole: $vector) -> $vector {
+                    // SAFETY: the caller has the instruction set.
                     unsafe { $cast($shift::<23>($add_whole($to_whole(whole), $whole(127)))) }
                 }
             }
@@ -237,23 +252,27 @@ mod x86 {
 macro_rules! dispatch {
     ($name:ident, $body:ident, ($($arg:ident: $kind:ty),*)) => {
         /// # Safety
-        /// The pointers must be good for what the body reads and writes.
+        /// The pointers are valid for what `$body` reads and writes.
         unsafe fn $name($($arg: $kind),*) {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2")]
                 unsafe fn eight($($arg: $kind),*) {
+                    // SAFETY: `eight` runs with AVX2 alone, and the pointers are the caller's.
                     unsafe { $body::<$crate::numerics::lanes::Eight>($($arg),*) }
                 }
                 match $crate::numerics::Kernel::current() {
-                    // `Kernel::current` names only what this machine has.
+                    // SAFETY: `Kernel::current` names only what this machine has, here AVX2, and
+                    // the pointers are the caller's.
                     $crate::numerics::Kernel::Avx2 => return unsafe { eight($($arg),*) },
                     $crate::numerics::Kernel::Sse2 => {
+                        // SAFETY: every x86-64 has SSE2, and the pointers are the caller's.
                         return unsafe { $body::<$crate::numerics::lanes::Four>($($arg),*) };
                     }
                     $crate::numerics::Kernel::Plain => {}
                 }
             }
+            // SAFETY: `One` needs no instruction set, and the pointers are the caller's.
             unsafe { $body::<$crate::numerics::lanes::One>($($arg),*) }
         }
     };

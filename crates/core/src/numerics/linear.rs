@@ -5,12 +5,15 @@ use super::{Floats, Rng, Shape, Sink, gemm, gemm_transposed_a, glorot, transpose
 /// `y = x·W + b`. Parameters lie flat: `W` row-major `[inputs × outputs]`, then `b` `[outputs]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Linear {
+    /// Numbers in a row of `x`.
     pub inputs: usize,
+    /// Numbers in a row of `y`.
     pub outputs: usize,
+    /// `W`, then `b`.
     pub parameters: Floats,
 }
 
-/// Room that [`Linear::backward`] works in; keep one per training, so that steps do not allocate.
+/// Memory for [`Linear::backward`]. Keep one per training, so that steps do not allocate.
 #[derive(Debug, Clone, Default)]
 pub struct LinearScratch {
     transposed: Vec<f32>,
@@ -24,15 +27,17 @@ impl Linear {
         Linear { inputs, outputs, parameters }
     }
 
+    /// `W`: row-major `[inputs × outputs]`.
     pub fn weights(&self) -> &[f32] {
         &self.parameters[..self.inputs * self.outputs]
     }
 
+    /// `b`: `[outputs]`.
     pub fn bias(&self) -> &[f32] {
         &self.parameters[self.inputs * self.outputs..]
     }
 
-    /// Whether the parameters are as many as the sizes say; to be asked of what was read back.
+    /// Whether there are as many parameters as the sizes say. Check it after reading a layer back.
     pub fn is_whole(&self) -> bool {
         self.inputs
             .checked_add(1)
@@ -40,7 +45,10 @@ impl Linear {
             .is_some_and(|count| count == self.parameters.len())
     }
 
+    /// Computes `y`.
+    ///
     /// - `x`: `[rows × inputs]`; `y`: `[rows × outputs]`, overwritten.
+    /// - panics: a slice does not have its size.
     pub fn forward(&self, rows: usize, x: &[f32], y: &mut [f32]) {
         for row in y.chunks_exact_mut(self.outputs) {
             row.copy_from_slice(self.bias());
@@ -48,10 +56,13 @@ impl Linear {
         gemm(self.shape(rows), x, self.weights(), y, Sink::Add);
     }
 
-    /// Adds the gradient of the parameters to `gradient` (laid out as `parameters`) and, when asked
-    /// for, overwrites `dx` `[rows × inputs]` with the gradient of `x`.
+    /// Adds the gradient of the parameters to `gradient`, and writes the gradient of `x`.
     ///
-    /// - `x`: what `forward` was given; `dy`: `[rows × outputs]`, the gradient of its result.
+    /// - `x`: what [`Linear::forward`] was given; `dy`: `[rows × outputs]`, the gradient of its
+    ///   result.
+    /// - `gradient`: laid out as `parameters`.
+    /// - `dx`: `[rows × inputs]`, overwritten; none if it is not needed.
+    /// - panics: a slice does not have its size.
     pub fn backward(
         &self,
         rows: usize,
@@ -80,12 +91,12 @@ impl Linear {
     }
 }
 
-/// max(x, 0) in place.
+/// Replaces every x by max(x, 0).
 pub fn relu(x: &mut [f32]) {
     x.iter_mut().for_each(|x| *x = if *x > 0.0 { *x } else { 0.0 });
 }
 
-/// Stops the gradient where [`relu`] gave 0; `y` is its result.
+/// Sets the gradient to 0 where [`relu`] gave 0; `y` is the result of [`relu`].
 pub fn relu_backward(y: &[f32], dy: &mut [f32]) {
     for (d, &y) in dy.iter_mut().zip(y) {
         *d = if y > 0.0 { *d } else { 0.0 };

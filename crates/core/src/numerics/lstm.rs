@@ -4,8 +4,8 @@ use super::{sigmoid_all, tanh_all};
 /// what comes out of them; then the new cells and the new state.
 ///
 /// A row of `gates` holds four parts of `units` numbers: input, forget and output gate (logistic),
-/// then the candidate (tanh). Source: Hochreiter and Schmidhuber 1997, with the forget gate of Gers,
-/// Schmidhuber and Cummins 2000.
+/// then the candidate (tanh). Source: Hochreiter and Schmidhuber 1997, with the forget gate of
+/// Gers, Schmidhuber and Cummins 2000.
 ///
 /// - `gates`: `[rows × 4·units]`; `before`: the cells before, `[rows × units]`.
 /// - `cells`, `squashed` (tanh of the cells), `state`: `[rows × units]`, overwritten.

@@ -5,6 +5,7 @@ use super::{Adam, AdamSettings, Linear, LinearScratch, Rng, relu, relu_backward}
 /// Linear layers with max(x, 0) between them and nothing after the last.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mlp {
+    /// In the order of the forward pass.
     pub layers: Vec<Linear>,
 }
 
@@ -28,11 +29,13 @@ impl MlpTrace {
 /// The gradient of each layer's parameters, with the optimiser of each.
 #[derive(Debug, Clone)]
 pub struct MlpGradients {
+    /// Per layer, laid out as its parameters.
     pub layers: Vec<Vec<f32>>,
     optimisers: Vec<Adam>,
 }
 
 impl MlpGradients {
+    /// Sets all gradients to zero.
     pub fn clear(&mut self) {
         self.layers.iter_mut().for_each(|layer| layer.fill(0.0));
     }
@@ -48,7 +51,9 @@ impl MlpGradients {
 }
 
 impl Mlp {
-    /// `sizes`: of the input, of each hidden layer, of the output.
+    /// A network with Glorot weights and zero biases.
+    ///
+    /// - `sizes`: of the input, of each hidden layer, of the output.
     ///
     /// - panics: fewer than two sizes.
     pub fn new(sizes: &[usize], rng: &mut Rng) -> Mlp {
@@ -56,15 +61,17 @@ impl Mlp {
         Mlp { layers: sizes.windows(2).map(|pair| Linear::new(pair[0], pair[1], rng)).collect() }
     }
 
+    /// Numbers in a row of the input; 0 without layers.
     pub fn inputs(&self) -> usize {
         self.layers.first().map_or(0, |layer| layer.inputs)
     }
 
+    /// Numbers in a row of the output; 0 without layers.
     pub fn outputs(&self) -> usize {
         self.layers.last().map_or(0, |layer| layer.outputs)
     }
 
-    /// Whether layers fit together and have all their parameters; to be asked of what was read
+    /// Whether layers fit together and have all their parameters. Check it after reading a network
     /// back.
     pub fn is_whole(&self) -> bool {
         !self.layers.is_empty()
@@ -72,6 +79,7 @@ impl Mlp {
             && self.layers.windows(2).all(|pair| pair[0].outputs == pair[1].inputs)
     }
 
+    /// Zero gradients, and an optimiser per layer before its first step.
     pub fn gradients(&self, settings: AdamSettings) -> MlpGradients {
         let count = |layer: &Linear| layer.parameters.len();
         MlpGradients {
@@ -80,6 +88,8 @@ impl Mlp {
         }
     }
 
+    /// Computes the output.
+    ///
     /// - `x`: `[rows × inputs]`.
     /// - returns: `[rows × outputs]`, which stays readable in `trace`.
     pub fn forward<'t>(&self, rows: usize, x: &[f32], trace: &'t mut MlpTrace) -> &'t [f32] {
@@ -97,8 +107,11 @@ impl Mlp {
         trace.output()
     }
 
-    /// Adds to `gradients`; `x` and `trace` are those of the forward pass, `dy` is the gradient of
-    /// its result. When asked for, overwrites `dx` with the gradient of `x`.
+    /// Adds the gradient of the parameters to `gradients`, and writes the gradient of `x`.
+    ///
+    /// - `x`, `trace`: those of the forward pass; `dy`: `[rows × outputs]`, the gradient of its
+    ///   result.
+    /// - `dx`: `[rows × inputs]`, overwritten; none if it is not needed.
     pub fn backward(
         &self,
         rows: usize,

@@ -1,16 +1,25 @@
-//! Arithmetic that gives the same bits on every machine: fixed order of summation, separate
-//! multiply and add, no function of the platform. Everything that learns is built on this room.
+//! Arithmetic that gives the same bits on every machine: a fixed order of summation, separate
+//! multiply and add, and no function of the platform. Everything that learns uses it.
+//!
+//! The kernels run on vector instructions, which need `unsafe`. A kernel is written once over
+//! `Lanes` and called through `dispatch!`, which picks the widest instructions that this machine
+//! has.
 
+#[allow(unsafe_code, reason = "its kernel runs on vector instructions")]
 mod adam;
+#[allow(unsafe_code, reason = "its kernels run on vector instructions")]
 mod elementary;
 mod floats;
+#[allow(unsafe_code, reason = "its kernel runs on vector instructions")]
 mod gemm;
 mod init;
+#[allow(unsafe_code, reason = "vector instructions are unsafe functions")]
 mod lanes;
 mod linear;
 mod lstm;
 mod mlp;
 mod rng;
+#[allow(unsafe_code, reason = "its kernels run on vector instructions")]
 mod vector;
 mod version;
 

@@ -1,8 +1,9 @@
 use crate::ids::Digest;
 
-/// Random numbers from a seed, the same stream for ever: xoshiro256++ on 256 bits of state.
+/// Random numbers from a seed: xoshiro256++ on 256 bits of state. The same seed gives the same
+/// numbers in every version.
 ///
-/// Own code rather than a package, because a package may change its stream in an upgrade and every
+/// Own code rather than a package: a package may change its numbers in an upgrade, and every
 /// trained mind would change with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rng {
@@ -10,6 +11,7 @@ pub struct Rng {
 }
 
 impl Rng {
+    /// The generator whose state is the digest.
     pub fn from_digest(seed: Digest) -> Rng {
         let mut state = [0; 4];
         for (word, bytes) in state.iter_mut().zip(seed.0.chunks_exact(8)) {
@@ -35,6 +37,7 @@ impl Rng {
         Rng { state }
     }
 
+    /// Uniform over all 64-bit numbers.
     pub fn next_u64(&mut self) -> u64 {
         let [a, b, c, d] = self.state;
         let result = a.wrapping_add(d).rotate_left(23).wrapping_add(a);
@@ -78,6 +81,7 @@ impl Rng {
         }
     }
 
+    /// Brings the items into a random order (Fisher–Yates).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for end in (1..items.len()).rev() {
             items.swap(end, self.below(end + 1));

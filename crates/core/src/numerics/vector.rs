@@ -12,24 +12,29 @@ pub fn dot(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len(), "vectors of one length");
     let mut sums = [0.0; STRIPES];
     let whole = a.len() / STRIPES * STRIPES;
-    // Both slices have at least `whole` numbers.
+    // SAFETY: both slices have at least `whole` numbers, a multiple of `STRIPES`, and `sums` has
+    // `STRIPES`.
     unsafe { stripes(a.as_ptr(), b.as_ptr(), whole, sums.as_mut_ptr()) };
     fold(sums, &a[whole..], |i, x| x * b[whole + i])
 }
 
-/// Σ aᵢ, summed like [`dot`].
+/// Σ aᵢ, summed in the order of [`dot`].
 pub fn sum(a: &[f32]) -> f32 {
     let mut sums = [0.0; STRIPES];
     let whole = a.len() / STRIPES * STRIPES;
+    // SAFETY: `a` has at least `whole` numbers, a multiple of `STRIPES`, and `sums` has `STRIPES`.
     unsafe { plain_stripes(a.as_ptr(), whole, sums.as_mut_ptr()) };
     fold(sums, &a[whole..], |_, x| x)
 }
 
-/// The Euclidean distance, summed like [`dot`]. Exactly 0 for equal vectors.
+/// The Euclidean distance, summed in the order of [`dot`]. Exactly 0 for equal vectors.
+///
+/// - panics: the lengths differ.
 pub fn distance(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len(), "vectors of one length");
     let mut sums = [0.0; STRIPES];
     let whole = a.len() / STRIPES * STRIPES;
+    // SAFETY: as in `dot`.
     unsafe { square_stripes(a.as_ptr(), b.as_ptr(), whole, sums.as_mut_ptr()) };
     fold(sums, &a[whole..], |i, x| (x - b[whole + i]) * (x - b[whole + i])).sqrt()
 }
@@ -44,15 +49,21 @@ fn fold(mut sums: [f32; STRIPES], rest: &[f32], term: impl Fn(usize, f32) -> f32
 
 dispatch!(stripes, stripes_body, (a: *const f32, b: *const f32, count: usize, sums: *mut f32));
 
+/// # Safety
+/// As [`add_up`]; `a` and `b` are valid for reads of `count` numbers.
 #[inline(always)]
 unsafe fn stripes_body<L: Lanes>(a: *const f32, b: *const f32, count: usize, sums: *mut f32) {
+    // SAFETY: `add_up` asks for `WIDTH` numbers at places that end before `count`.
     unsafe { add_up::<L>(count, sums, |at| L::mul(L::load(a.add(at)), L::load(b.add(at)))) }
 }
 
 dispatch!(plain_stripes, plain_body, (a: *const f32, count: usize, sums: *mut f32));
 
+/// # Safety
+/// As [`add_up`]; `a` is valid for reads of `count` numbers.
 #[inline(always)]
 unsafe fn plain_body<L: Lanes>(a: *const f32, count: usize, sums: *mut f32) {
+    // SAFETY: `add_up` asks for `WIDTH` numbers at places that end before `count`.
     unsafe { add_up::<L>(count, sums, |at| L::load(a.add(at))) }
 }
 
@@ -62,17 +73,28 @@ dispatch!(
     (a: *const f32, b: *const f32, count: usize, sums: *mut f32)
 );
 
+/// # Safety
+/// As [`stripes_body`].
 #[inline(always)]
 unsafe fn square_body<L: Lanes>(a: *const f32, b: *const f32, count: usize, sums: *mut f32) {
+    // SAFETY: `add_up` asks for `WIDTH` numbers at places that end before `count`.
     let term = |at| unsafe {
         let gap = L::sub(L::load(a.add(at)), L::load(b.add(at)));
         L::mul(gap, gap)
     };
+    // SAFETY: the caller's promises are those of `add_up`.
     unsafe { add_up::<L>(count, sums, term) }
 }
 
+/// Adds `term(at)` for `at = 0, WIDTH, 2·WIDTH, … < count` to the partial sums.
+///
+/// # Safety
+/// The machine has the instruction set of `L`. `count` is a multiple of [`STRIPES`], which is one
+/// of `L::WIDTH`; `sums` is valid for writes of [`STRIPES`] numbers.
 #[inline(always)]
 unsafe fn add_up<L: Lanes>(count: usize, sums: *mut f32, term: impl Fn(usize) -> L::Vector) {
+    // SAFETY: the operations need the instruction set alone. The stores go to `vectors · WIDTH =
+    // STRIPES` numbers at `sums`.
     unsafe {
         let mut stripe = [L::splat(0.0); STRIPES];
         let vectors = STRIPES / L::WIDTH;

@@ -1,10 +1,14 @@
 use serde::{Deserialize, Serialize};
 
-/// Which arithmetic a mind was trained with. Any change of this room that changes a bit of any
-/// result gets a new number; recipes name theirs, so an old mind is never held against new sums.
+/// Which arithmetic a mind was trained with. A change in `numerics` that changes a bit of any
+/// result gets a new number. Recipes name their number, so an old mind is never compared with new
+/// sums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct NumericsVersion(pub u16);
+pub struct NumericsVersion(
+    /// From 1.
+    pub u16,
+);
 
 impl NumericsVersion {
     /// What this build computes with.

@@ -1,20 +1,24 @@
 use serde::{Deserialize, Serialize};
 
-/// Which edition of a domain's words a recipe reads. A later edition mends what an earlier one
-/// names wrongly; the earlier one stays, so that what was answered with it is answered so again.
+/// Which edition of a world's words a recipe reads. A later edition corrects an earlier one. The
+/// earlier one stays, so that a replay gives the answers of that time.
 ///
-/// Written as its number; 1 where a recipe says nothing.
+/// Written as its number, from 1. A recipe that names no edition reads the first.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "i64", into = "i64")]
 pub enum Edition {
+    /// The words of release 0.1.
     #[default]
     First,
+    /// The words of release 0.2.
     Second,
 }
 
 impl Edition {
+    /// All editions, oldest first.
     pub const ALL: [Edition; 2] = [Edition::First, Edition::Second];
 
+    /// Whether this is the first edition.
     pub fn is_first(&self) -> bool {
         *self == Edition::First
     }

@@ -3,7 +3,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::language::{Exemplar, Habits, LiftedUtterance, Roles, Symbol};
 
-/// What things are called. Shared by a domain's users; people teach requests, not names.
+/// What things are called. All users of a world share it: people teach requests, not names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Lexicon {
     /// From a lower-case name in the singular (`coffee mug`, `bar of soap`) to what it may mean,
@@ -13,20 +13,20 @@ pub struct Lexicon {
     pub plurals: BTreeMap<String, String>,
     /// Words that stand for something named before: `it`, `them`.
     pub pronouns: Vec<String>,
-    /// Words before a name that say how it looks or which one it is, and may be swallowed in
-    /// lifting: `red`, `small`, `left`. No state words (`clean`, `cold`, `sliced`), no numbers.
+    /// Words before a name that say how the thing looks or which one it is; lifting may drop them:
+    /// `red`, `small`, `left`. No state words (`clean`, `cold`, `sliced`), no numbers.
     pub adjectives: Vec<String>,
-    /// Types whose word is worth keeping beside their slot, with that word: `SinkBasin` → `sink`.
+    /// Types whose word is kept in their slot, where the recipe wants it: `SinkBasin` → `sink`.
     pub fixtures: BTreeMap<Symbol, String>,
-    /// How recorded people used words for the domain's operators; none where nobody was recorded.
+    /// How recorded people used words for the operators; none in a world without recordings.
     pub habits: Option<Arc<Habits>>,
     /// Which operators go, take, put and open.
     pub roles: Roles,
-    /// Found in `names` when it is first asked for.
+    /// Computed from `names` by [`Lexicon::summary`].
     pub summary: OnceLock<NameSummary>,
 }
 
-/// What a lexicon's names are like on the whole.
+/// What the names of a lexicon are like, taken together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NameSummary {
     /// Words of the longest name.
@@ -36,6 +36,7 @@ pub struct NameSummary {
 }
 
 impl Lexicon {
+    /// What the names are like; computed at the first call.
     pub fn summary(&self) -> &NameSummary {
         self.summary.get_or_init(|| {
             let longest = self.names.keys().map(|name| name.split(' ').count()).max().unwrap_or(0);
@@ -73,7 +74,9 @@ impl Lexicon {
 /// One thing that a name may mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Meaning {
+    /// The sort of the type.
     pub sort: Symbol,
+    /// The type.
     pub kind: Symbol,
     /// How often recorded people used the name for this type; for breaking ties.
     pub count: u32,
@@ -84,8 +87,8 @@ pub struct Meaning {
 pub struct SeedSet {
     /// The exemplars: 44 in the household (paper, Table 1).
     pub exemplars: Vec<Exemplar>,
-    /// Variants that no exemplar has, for calibration: an utterance and its right program.
+    /// For calibration: utterances that are no exemplars, each with its right program.
     pub variants: Vec<Exemplar>,
-    /// Utterances with verbs that no seed has, for calibration: nothing known is right for them.
+    /// For calibration: utterances with verbs that no seed has, so that no exemplar is right.
     pub unknown: Vec<LiftedUtterance>,
 }

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::super::facts::{Room, facts};
 use super::{Household, Task};
 use crate::language::{LiftedArg, Word};
-use crate::world::{Domain, Edition, Lexicon};
+use crate::world::{Edition, Lexicon, Words, World};
 
 #[test]
 fn every_recorded_task_makes_sense() {

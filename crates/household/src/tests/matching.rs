@@ -5,7 +5,7 @@ use std::path::Path;
 use super::super::{MatchingScene, Room};
 use super::{Household, Scene, Task, run};
 use crate::language::Program;
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Show, Words};
 
 fn matching(household: &Household, program: &str, seed: u64) -> Result<Scene, String> {
     let program: Program = program.parse().unwrap();

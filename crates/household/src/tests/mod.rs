@@ -13,7 +13,7 @@ mod told;
 
 use super::{Household, Scene, Task};
 use crate::language::{Mention, Program, Symbol};
-use crate::world::{Domain, Edition, Stage};
+use crate::world::{Edition, Stage, Words, World};
 
 pub(super) const EXAMPLE: &str = include_str!("../../data/example_scene.toml");
 

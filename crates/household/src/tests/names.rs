@@ -6,7 +6,7 @@ use super::super::facts::{embedded, facts};
 use super::super::{Kind, Room, Scene, SceneBuilder};
 use super::{Household, mention};
 use crate::language::Utterance;
-use crate::world::{Domain, Edition, Lexicon};
+use crate::world::{Edition, Lexicon, Words};
 
 const OVERLAY: &str = include_str!("../../data/names-2.toml");
 const FIRST: &str = include_str!("../../data/names.toml");

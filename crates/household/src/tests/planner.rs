@@ -7,7 +7,7 @@ use super::super::primitives::{Action, act};
 use super::super::random::Random;
 use super::super::task_goal::achieved;
 use super::{Household, Scene, Task, kitchen, run};
-use crate::world::{Domain, Stage};
+use crate::world::{Stage, World};
 
 fn fewest(task: &str) -> (usize, String) {
     let (household, mut scene, task) = kitchen(task);

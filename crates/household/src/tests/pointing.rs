@@ -1,6 +1,6 @@
 use super::{Household, Scene, Task, run};
 use crate::language::{Step, Symbol};
-use crate::world::{Domain, Pointing, Stage};
+use crate::world::{Pointing, Stage, Words, World};
 
 /// The robot stands at the table. Mug 1 and Mug 3 are dirty, Potato 1 is cold, Drawer 2 is closed.
 const KITCHEN: &str = r#"

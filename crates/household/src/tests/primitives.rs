@@ -1,5 +1,5 @@
 use super::{kitchen, run};
-use crate::world::Domain;
+use crate::world::{Show, World};
 
 fn refusal(program: &str) -> String {
     let (household, mut scene, task) = kitchen("free");

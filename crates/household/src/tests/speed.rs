@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 use super::super::{Room, SceneBuilder};
 use super::{Household, run};
 use crate::language::{Document, Step};
-use crate::world::{Domain, Stage};
+use crate::world::{Features, Stage, World};
 
 /// Prints figures; asserts nothing about time, which depends on who else uses the machine.
 #[test]

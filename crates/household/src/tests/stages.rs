@@ -4,7 +4,7 @@ use super::super::{SceneBuilder, facts::Room};
 use super::{EXAMPLE, Household, Scene, Task};
 use crate::language::Document;
 use crate::limits::SCENE_OBJECTS_MAX;
-use crate::world::{Domain, Stage, StageError};
+use crate::world::{Stage, StageError, World};
 
 fn stage(task: &str, seed: u64) -> Result<(Scene, Task), StageError> {
     Household::new().stage(&Stage::Task { task: task.to_owned(), seed })

@@ -1,6 +1,6 @@
 use super::{Household, kitchen, run};
 use crate::language::{Mention, Symbol};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Features, Show, Words};
 
 fn mention(household: &Household, surface: &str) -> Mention {
     super::mention(household, Edition::First, surface)

@@ -11,12 +11,12 @@ use crate::world::Lexicon;
 
 /// Words that may stand between "from" and a name.
 const DETERMINERS: [&str; 9] = ["the", "a", "an", "its", "his", "her", "their", "your", "my"];
-/// A name is a fixture's when so many tenths of its uses are.
+/// A name means a fixture if at least so many tenths of its uses do.
 const FIXTURE_TENTHS: u32 = 3;
-/// Before a number behind a name: "mug NUMBER two".
+/// Between a name and its number: "mug NUMBER two".
 const NUMBER: [&str; 3] = ["number", "no", "nr"];
 const NUMBERS: [&str; 6] = ["one", "two", "three", "four", "five", "six"];
-/// Words that open a phrase which says where a thing is.
+/// Begins a phrase that says where a thing is.
 const LOCATION: &str = "from";
 
 /// Entity abstraction: finds the mentions in an utterance and puts slots in their places (paper,
@@ -32,11 +32,11 @@ pub struct Abstractor<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Abstracted {
     pieces: Vec<Piece>,
-    /// What stood around the request and was taken away.
+    /// The phrases around the request that were removed.
     pub frames: Vec<String>,
-    /// Why it is no request, where it is none.
+    /// Why it is not a request; none for a request.
     pub mood: Option<Mood>,
-    /// Words that ask for more, less or other than one step can say.
+    /// Words of amount, which no single step can satisfy.
     pub amounts: Vec<String>,
 }
 
@@ -47,17 +47,17 @@ enum Piece {
     Mark,
     Named {
         mention: Mention,
-        /// Swallowed words before the name.
+        /// Dropped words before the name.
         attributes: Vec<String>,
         fixture: Option<String>,
-        /// Everything this piece was made of, as said.
+        /// All words of this piece, as said.
         said: Vec<String>,
     },
 }
 
 impl<'a> Abstractor<'a> {
-    /// - `known`: whether a word is in ordinary use (in the word table); such a word is never
-    ///   taken for a misspelt name.
+    /// - `known`: whether a word is in ordinary use (in the word table); such a word is never read
+    ///   as a misspelt name.
     pub fn new(
         lexicon: &'a Lexicon,
         settings: &'a Abstraction,
@@ -139,7 +139,7 @@ impl<'a> Abstractor<'a> {
         pieces
     }
 
-    /// "Mug 2": the number behind a name goes to what says which one.
+    /// "Mug 2": the number after a name becomes an attribute.
     fn number(&self, behind: &[&str], pieces: &mut [Piece]) -> usize {
         let Some(Piece::Named { mention, attributes, said, .. }) = pieces.last_mut() else {
             return 0;
@@ -158,13 +158,13 @@ impl<'a> Abstractor<'a> {
         before + 1
     }
 
-    /// Whether a name is said as a verb: where a clause begins, before an object.
+    /// Whether a name is a verb here: at the beginning of a clause, before an object.
     fn is_verb(&self, lists: &WordLists, pieces: &[Piece], ahead: &[&str]) -> bool {
         let [word, after, ..] = ahead else { return false };
         if !lists.noun_verbs.contains(*word) && !lists.verbs.contains(*word) {
             return false;
         }
-        // The longer name wins: "plate rack" is no plating.
+        // The longer name counts: "plate" is not a verb in "plate rack".
         if self.names.starting(ahead).is_none_or(|(count, _)| count > 1) {
             return false;
         }
@@ -181,7 +181,7 @@ impl<'a> Abstractor<'a> {
         }
     }
 
-    /// How many words behind a name only say that it is a part: "apple slices".
+    /// How many words after a name only say that it is a part: "apple slices".
     fn portions(&self, behind: &[&str]) -> usize {
         let Some(lists) = &self.settings.lists else { return 0 };
         behind.iter().take_while(|word| lists.is_portion(word)).count()
@@ -193,7 +193,7 @@ impl<'a> Abstractor<'a> {
         })
     }
 
-    /// - returns: how many mentions before this one were folded into it.
+    /// - returns: how many mentions before this one were merged into it.
     fn push_named(
         &self,
         pieces: &mut Vec<Piece>,
@@ -206,7 +206,7 @@ impl<'a> Abstractor<'a> {
             attributes.splice(0..0, words.iter().cloned());
             said.splice(0..0, words);
         };
-        // Nothing that opens a clause is swallowed: it is the verb ("clear table").
+        // The first word of a clause is never dropped: it is the verb ("clear table").
         while !mention.pronoun && pieces.len() >= 2 && !opens_clause(&pieces[pieces.len() - 2]) {
             match pieces.last() {
                 Some(Piece::Word(word))
@@ -265,8 +265,8 @@ impl<'a> Abstractor<'a> {
         mention.types.first().filter(|_| all_fixtures).and_then(word).cloned()
     }
 
-    /// The word of the fixture that a fair share of a name's uses mean: "sink" is the sink, though
-    /// some say it of other things.
+    /// The word of the fixture that a name often means: "sink" is the sink, though some people use
+    /// it for other things.
     fn usual_fixture(&self, mention: &Mention) -> Option<String> {
         let meanings = self.lexicon.names.get(&mention.surface)?;
         let all: u32 = meanings.iter().map(|meaning| meaning.count).sum();
@@ -276,7 +276,7 @@ impl<'a> Abstractor<'a> {
 }
 
 impl Abstracted {
-    /// The utterance as one clause, "and" and all.
+    /// The utterance as one clause.
     pub fn whole(&self) -> Clause {
         clause(self.pieces.iter())
     }
@@ -284,8 +284,8 @@ impl Abstracted {
     /// The clauses between the places where `split` cuts; `None` when there is nothing to cut or
     /// when there would be more than [`CLAUSES_MAX`].
     ///
-    /// With [`Split::Verbs`] a single clause is returned as well when it is not all that was said:
-    /// "holding the card, turn on the lamp".
+    /// With [`Split::Verbs`], a single clause is returned too if words were left out: "holding the
+    /// card, turn on the lamp".
     pub fn clauses(&self, split: Split, grammar: Option<Grammar<'_>>) -> Option<Vec<Clause>> {
         if let (Split::Verbs, Some(grammar)) = (split, grammar) {
             let whole = self.whole();
@@ -363,7 +363,7 @@ fn cuts(piece: &Piece, split: Split) -> bool {
     }
 }
 
-/// Whether the next word is the first of a clause, however clauses are cut.
+/// Whether the next word begins a clause, for every way of cutting.
 fn opens_clause(before: &Piece) -> bool {
     cuts(before, Split::Clauses)
 }

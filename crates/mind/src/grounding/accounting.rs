@@ -1,44 +1,48 @@
-//! Whether a reading uses every word that asks for something. What it would pass over is named, and
-//! the reading is not taken.
+//! Checks that a reading uses every word that asks for something. A reading with unused words is
+//! not taken, and the answer names them.
 
 use super::settings::Accounting;
 use crate::language::{Clause, Grammar, LiftedUtterance, Roles, Symbol, Word, WordLists};
 
-/// A clause whose words are accounted for.
+/// A clause, and what is needed to account for its words.
 pub(super) struct Account<'a> {
+    /// The recipe's lists.
     pub lists: &'a WordLists,
-    /// The domain's.
+    /// The lexicon's.
     pub adjectives: &'a [String],
+    /// Of the world's operators.
     pub roles: &'a Roles,
+    /// What needs no use.
     pub accounting: &'a Accounting,
+    /// The words.
     pub clause: &'a Clause,
 }
 
-/// Words between clauses that say when.
+/// Words of time between clauses.
 const ORDER: [&str; 3] = ["before", "after", "while"];
 
-/// Words before the thing that something is done with.
+/// Words before a tool.
 pub(super) const TOOLS: [&str; 2] = ["with", "using"];
 
-/// What stands where a thing is named.
+/// What the words name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Head<'a> {
-    /// A thing that is known.
+    /// A known thing.
     Known,
     /// A noun that names nothing known.
     Unknown(&'a str),
-    /// No thing.
+    /// Nothing.
     Nothing,
 }
 
 impl<'a> Account<'a> {
-    /// The words that a reading as one primitive passes over: a thing or a place that nobody knows,
-    /// and degrees of what is only switched.
+    /// The words that a reading as one primitive has no use for: an unknown thing or place, and
+    /// degrees of a thing that is only switched.
     ///
-    /// Only words where the object stands, where the place of a way or a putting stands, and behind
-    /// a joining word count. Near what a thing is, may be called as people like: half of the
-    /// recorded landmarks have no name here.
-    pub fn of_primitive(&self, operator: &Symbol) -> Vec<String> {
+    /// Only words at the object, at the place of a way or of a putting, and after a joining word
+    /// count. Landmarks do not count: half of those that people named in the recordings have no
+    /// name here.
+    pub(super) fn of_primitive(&self, operator: &Symbol) -> Vec<String> {
         let mut left = Vec::new();
         left.extend(match self.roles.goes(operator) {
             true => self.unknown_way(),
@@ -59,9 +63,9 @@ impl<'a> Account<'a> {
         owned(left)
     }
 
-    /// The words that a lesson passes over: a thing that nobody knows and that the lesson did not
-    /// name either.
-    pub fn of_lesson(&self, taught: &LiftedUtterance) -> Vec<String> {
+    /// The words that a lesson has no use for: an unknown thing that the lesson did not name
+    /// either.
+    pub(super) fn of_lesson(&self, taught: &LiftedUtterance) -> Vec<String> {
         let in_lesson = |word: &&str| {
             taught.words.iter().any(|known| matches!(known, Word::Text(text) if text == word))
         };
@@ -85,8 +89,8 @@ impl<'a> Account<'a> {
         other.then_some(first)
     }
 
-    /// The words that a clause without a deed passes over: a way to what nobody knows.
-    pub fn of_idle(&self) -> Vec<String> {
+    /// The words that a clause without a step has no use for: a way to an unknown thing.
+    pub(super) fn of_idle(&self) -> Vec<String> {
         let ways = self.texts().filter(|(_, word)| self.lists.destination.contains(*word));
         let unknown = ways.filter_map(|(at, _)| self.unknown_at(at + 1, false));
         owned(unknown)
@@ -94,7 +98,7 @@ impl<'a> Account<'a> {
 
     /// "2 apples", "20 %": no step has a number.
     fn numbers(&self) -> Option<&'a str> {
-        // "For 2 seconds" is how long, which a parser judges.
+        // "For 2 seconds" is a duration, which the parser judges.
         let lasts = |at: usize| match self.words().get(at + 1) {
             Some(Word::Text(next)) => self.lists.lasting.contains(next),
             _ => false,
@@ -111,8 +115,8 @@ impl<'a> Account<'a> {
         self.unknown_at(with.0 + 1, false)
     }
 
-    /// "Turn the lamp to the left": what is only switched goes nowhere. "Next to the cup" and "to the
-    /// left of the cup" are where it is.
+    /// "Turn the lamp to the left": a thing that is only switched goes nowhere. "Next to the cup"
+    /// and "to the left of the cup" say where it is.
     fn towards(&self) -> Option<&'a str> {
         let text = |at: usize| match self.words().get(at) {
             Some(Word::Text(word)) => Some(word.as_str()),
@@ -132,7 +136,7 @@ impl<'a> Account<'a> {
         self.texts().find(to).map(|(_, word)| word)
     }
 
-    /// "Turn the lamp up", "red": where the clause ends or a function word follows.
+    /// "Turn the lamp up", "red": at the end of the clause or before a function word.
     fn degrees(&self) -> Option<&'a str> {
         let ends = |at: usize| match self.words().get(at + 1) {
             None => true,
@@ -161,7 +165,7 @@ impl<'a> Account<'a> {
         Grammar { lists: self.lists, adjectives: self.adjectives }
     }
 
-    /// Behind the verb and its particles.
+    /// After the verb and its particles.
     fn object_at(&self) -> usize {
         let after = self.grammar().main_verb(self.words()).map_or(0, |verb| verb.at + 1);
         let passed = |word: &&Word| match word {
@@ -179,7 +183,7 @@ impl<'a> Account<'a> {
         self.unknown_at(self.object_at(), true)
     }
 
-    /// Of a way, what stands behind the first word that says where to; of "face the …" the object.
+    /// For a way, after the first word of direction; for "face the …", the object.
     fn unknown_way(&self) -> Option<&'a str> {
         let verb = self.grammar().main_verb(self.words()).map_or(0, |verb| verb.at);
         let mut ways = self.texts().filter(|(at, word)| {
@@ -189,10 +193,10 @@ impl<'a> Account<'a> {
         self.unknown_at(from, false)
     }
 
-    /// Of a putting, what stands behind the first preposition that a thing follows.
+    /// For a putting, after the first preposition before a thing.
     fn unknown_place(&self) -> Option<&'a str> {
         let onto = |word: &str| self.lists.onto.contains(word) || self.lists.inside.contains(word);
-        // "To the left of the drain" says near what, not where to.
+        // "To the left of the drain" is a landmark, not the place.
         let aside = |at: usize| {
             let mut after = self.words()[at + 1..].iter();
             let next = after.find(|word| match word {
@@ -212,10 +216,10 @@ impl<'a> Account<'a> {
         })?
     }
 
-    /// "The mug and the banana", "and sing": behind a joining word.
+    /// "The mug and the banana", "and sing": after a joining word.
     fn unknown_joined(&self) -> Option<&'a str> {
         let verb = self.grammar().main_verb(self.words()).map(|verb| verb.at);
-        // "Before opening it" and "after a moment" say when, and nothing more to do.
+        // "Before opening it" and "after a moment" say when, and ask for no step.
         let joins = |word: &str| self.lists.cuts.contains(word) && !ORDER.contains(&word);
         let mut joined = self.texts().filter(|(_, word)| joins(word));
         joined.find_map(|(at, word)| match (self.head(at + 1, false), self.words().get(at + 1)) {
@@ -230,7 +234,7 @@ impl<'a> Account<'a> {
         })
     }
 
-    /// Whether a word is no function word.
+    /// Whether a word is not a function word.
     fn is_content(&self, word: &str) -> bool {
         let lists = self.lists;
         !lists.stop.contains(word)
@@ -246,7 +250,7 @@ impl<'a> Account<'a> {
             && !self.grammar().is_adjective(word)
     }
 
-    /// The noun from `at` on that names nothing known, if that is what stands there.
+    /// The noun at `at` that names nothing known, if there is one.
     fn unknown_at(&self, at: usize, object: bool) -> Option<&'a str> {
         match self.head(at, object) {
             Head::Unknown(word) => Some(word),
@@ -256,7 +260,7 @@ impl<'a> Account<'a> {
 
     /// What the words from `at` on name: the last noun before a word of another sort.
     ///
-    /// - `object`: whether the thing that is acted on stands there, of which a part is another thing.
+    /// - `object`: whether this is the object. A part of an object is another thing.
     fn head(&self, mut at: usize, object: bool) -> Head<'a> {
         let part = |text: &String| !object && self.accounting.parts.contains(text);
         let words = self.words();
@@ -265,7 +269,7 @@ impl<'a> Account<'a> {
         while let Some(word) = words.get(at) {
             match word {
                 Word::Slot { .. } => {
-                    // "The apple pie" is no apple.
+                    // "The apple pie" is not an apple.
                     return match words.get(at + 1) {
                         Some(Word::Text(next)) if self.is_noun(next, false) && !part(next) => {
                             Head::Unknown(next)
@@ -294,7 +298,7 @@ impl<'a> Account<'a> {
         unknown.map_or(Head::Nothing, Head::Unknown)
     }
 
-    /// Whether a harmless noun stands at `at`, and "of" behind it.
+    /// Whether there is a harmless noun at `at`, and then "of".
     fn leads_to_of(&self, at: usize) -> bool {
         let text = |at: usize| match self.words().get(at) {
             Some(Word::Text(text)) => Some(text.as_str()),
@@ -309,7 +313,7 @@ impl<'a> Account<'a> {
 
     /// Whether a word may be the name of a thing.
     ///
-    /// - `determined`: whether an article stands before it; "the drink" is no drinking.
+    /// - `determined`: whether an article is before it: "the drink" is a noun.
     fn is_noun(&self, word: &str, determined: bool) -> bool {
         let lists = self.lists;
         let aside = lists.stop.contains(word)

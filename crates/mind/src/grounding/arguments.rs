@@ -5,19 +5,23 @@ use crate::language::{
     Clause, Grammar, LiftedArg, LiftedProgram, Mention, Program, Roles, Step, Symbol, Word,
     WordLists,
 };
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
-/// Which things fill the slots of an open program, by what the world allows: the first mention, in
-/// the order of the words, of a type that the operator can ever act on.
+/// Chooses the things that fill the slots of an open program: the first mention, in the order of
+/// the words, of a type that the operator can ever act on.
 ///
-/// A name that could be the argument is never passed over, whether or not it is in the scene:
-/// "take the spatula from the plate" without a spatula is not about the plate.
-pub struct Arguments<'a, D: Domain> {
+/// A name that could be the argument is never skipped, even if the scene has no such thing: "take
+/// the spatula from the plate" without a spatula is not about the plate.
+pub(super) struct Arguments<'a, D: Words> {
+    /// The world.
     pub domain: &'a D,
+    /// The recipe's lists.
     pub lists: &'a WordLists,
+    /// The words.
     pub clause: &'a Clause,
     /// Per mention the types it may mean here, best first.
     pub types: &'a [Vec<Symbol>],
+    /// What is in the hand.
     pub held: Option<Symbol>,
     /// What the robot stands at.
     pub here: Option<Symbol>,
@@ -27,29 +31,30 @@ pub struct Arguments<'a, D: Domain> {
     pub recent: Vec<Symbol>,
     /// Per mention whether nothing of its likeliest type is in the scene.
     pub absent: Vec<bool>,
-    /// What may be passed over, where words are accounted for. There, several things that are named
-    /// side by side each get the operator, and a pronoun means what the operator can work on.
+    /// What needs no use, if words are accounted for. If so, each of several things named side by
+    /// side gets the operator, and a pronoun means a thing that the operator can work on.
     pub accounting: Option<&'a Accounting>,
-    /// Of the domain's words.
+    /// Of the world's words.
     pub edition: Edition,
 }
 
 /// A way to fill an open program.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filling {
-    /// To be tried in order: they differ in types that share a name.
+pub(super) struct Filling {
+    /// In the order to be tried. They differ in types that share a name.
     pub programs: Vec<Program>,
     /// How far the choice is from the obvious one; 0 is obvious.
     pub penalty: f32,
 }
 
-impl<D: Domain> Arguments<'_, D> {
-    pub fn accounts(&self) -> bool {
+impl<D: Words> Arguments<'_, D> {
+    /// Whether words are accounted for.
+    pub(super) fn accounts(&self) -> bool {
         self.accounting.is_some()
     }
 
     /// - returns: `None` when the words leave a slot open.
-    pub fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
+    pub(super) fn fill(&self, program: &LiftedProgram) -> Option<Filling> {
         let roles = &self.domain.lexicon(self.edition).roles;
         let slot = |arg: &LiftedArg| matches!(arg, LiftedArg::Slot { .. });
         match program.steps.as_slice() {
@@ -62,8 +67,8 @@ impl<D: Domain> Arguments<'_, D> {
         }
     }
 
-    /// A lesson about one thing, for things that are named side by side: "wash the apple and the
-    /// plate".
+    /// Applies a lesson about one thing to several things named side by side: "wash the apple and
+    /// the plate".
     fn each_in_turn(&self, program: &LiftedProgram) -> Option<Filling> {
         if !self.accounts() || program.slots() != 1 || !self.is_next_to(1) {
             return None;
@@ -85,12 +90,12 @@ impl<D: Domain> Arguments<'_, D> {
         for (place, kinds) in self.types.iter().enumerate() {
             let fitting = self.fitting(operator, 0, kinds);
             if !fitting.is_empty() {
-                // "Take the mug to the sink" and "turn to the stove" are ways, not deeds.
+                // "Take the mug to the sink" and "turn to the stove" are ways.
                 let way = if roles.takes(operator) { place + 1 } else { place };
                 if (works || roles.takes(operator)) && self.is_way_to(way) {
                     return None;
                 }
-                // Two things are more than one hand takes.
+                // One hand cannot take two things.
                 let another = || {
                     self.types
                         .get(place + 1)
@@ -99,7 +104,7 @@ impl<D: Domain> Arguments<'_, D> {
                 if roles.takes(operator) && self.is_joined(place + 1) && another() {
                     return None;
                 }
-                // "Pick up the … next to the mug": what it is about has no name.
+                // "Pick up the … next to the mug": the object has no known name.
                 if self.accounts() && roles.takes(operator) && self.is_landmark(place) {
                     return None;
                 }
@@ -158,7 +163,7 @@ impl<D: Domain> Arguments<'_, D> {
                 }))
     }
 
-    /// Whether nothing but a verb and its particles stands before a mention.
+    /// Whether only a verb and its particles are before a mention.
     pub(super) fn is_object(&self, place: usize, before: &[&str]) -> bool {
         let aside = |word: &&str| {
             self.lists.passed.contains(*word)
@@ -168,7 +173,7 @@ impl<D: Domain> Arguments<'_, D> {
         };
         let verb =
             |word: &&str| self.lists.verbs.contains(*word) || self.lists.noun_verbs.contains(*word);
-        // "The bowl with the sliced tomato": behind a preposition it says where or how.
+        // "The bowl with the sliced tomato": after a preposition it says where or how.
         if before.iter().any(|word| self.lists.stop.contains(*word) && !aside(word)) {
             return false;
         }
@@ -196,7 +201,7 @@ impl<D: Domain> Arguments<'_, D> {
             }
         }
         order.sort_unstable();
-        // "To the dishwasher", which nobody knows, is not to what else was named.
+        // "To the dishwasher", which is unknown, does not mean another thing that was named.
         if lost && order.first().is_some_and(|(aimless, _)| *aimless) {
             return None;
         }
@@ -214,7 +219,7 @@ impl<D: Domain> Arguments<'_, D> {
         })
     }
 
-    /// What is in the hand goes to the place that is named, else to where the robot stands.
+    /// Puts the thing in the hand at the named place, else where the robot stands.
     fn put(&self, operator: &Symbol) -> Option<Filling> {
         let held = self.held.clone()?;
         let named = self.types.len();
@@ -245,7 +250,8 @@ impl<D: Domain> Arguments<'_, D> {
                 args: vec![held.clone(), place.clone()],
             }],
         };
-        // "From the counter" is no place to put it; "next to the cup" is only when nothing else is.
+        // "From the counter" is not a place to put it. "Next to the cup" is one only if there is no
+        // other.
         let leaves = |place: &usize| {
             self.before(*place).last().is_some_and(|word| self.lists.leaving.contains(*word))
         };
@@ -271,7 +277,7 @@ impl<D: Domain> Arguments<'_, D> {
             }
         }
         for (skipped, place) in rest.iter().enumerate() {
-            // Next to the cup is where the robot stands rather than in the cup.
+            // "Next to the cup" means where the robot stands, and not in the cup.
             let stands = !self.fitting(operator, 1, self.here.as_slice()).is_empty();
             if stands && self.is_landmark(*place) {
                 continue;
@@ -283,7 +289,7 @@ impl<D: Domain> Arguments<'_, D> {
             let named = kinds.iter().find(|kind| **kind != held).cloned();
             let mut kinds = self.fitting(operator, 1, kinds);
             kinds.retain(|kind| *kind != held);
-            // What nothing can be put on is said to be so by the world, and nothing else is taken.
+            // If nothing can be put there, the world says so; no other place is taken.
             if self.accounts() && kinds.is_empty() && self.is_place(*place) {
                 kinds.extend(named);
             }
@@ -298,7 +304,7 @@ impl<D: Domain> Arguments<'_, D> {
         Some(Filling { programs: vec![put(here)], penalty })
     }
 
-    /// Whether a mention is called as parts of many things are, and nothing of its type is here.
+    /// Whether a mention has a name for parts of many things, and nothing of its type is here.
     pub(super) fn is_part(&self, place: usize) -> bool {
         let part = |parts: &BTreeSet<String>| {
             let name = self.said(place).map_or("", |mention| mention.surface.as_str());
@@ -313,7 +319,7 @@ impl<D: Domain> Arguments<'_, D> {
         !self.fitting(operator, 1, here.cloned().as_slice()).is_empty()
     }
 
-    /// Whether a mention stands right behind a word that says where something is put.
+    /// Whether a mention is right after a word that says where something is put.
     pub(super) fn is_place(&self, place: usize) -> bool {
         let before = self.before(place);
         before.last().is_some_and(|word| {
@@ -331,8 +337,8 @@ impl<D: Domain> Arguments<'_, D> {
         Some(Filling { programs: vec![Program { steps: vec![step] }], penalty: 0.0 })
     }
 
-    /// Each slot in turn takes the first mention left that fits everything it is used for; what is
-    /// taken or put is what is in the hand, if there is something.
+    /// Each slot in turn gets the first unused mention that fits all its uses. The thing that is
+    /// taken or put is the one in the hand, if there is one.
     fn in_turn(&self, roles: &Roles, program: &LiftedProgram) -> Option<Filling> {
         let mut used = BTreeSet::new();
         let mut meant: Vec<Option<Symbol>> = vec![None; program.slots()];
@@ -355,7 +361,7 @@ impl<D: Domain> Arguments<'_, D> {
             let fits = |kind: &&Symbol| {
                 uses.iter().all(|(operator, place)| self.domain.fits(operator, *place, kind))
             };
-            // A lesson about a fridge is about a table too: what has no door need not be opened.
+            // A lesson about a fridge also fits a table: a thing without a door need not be opened.
             let fits_but_for_doors = |kind: &&Symbol| {
                 let mut uses = uses.iter().filter(|(operator, _)| !roles.is_door(operator));
                 self.accounts()
@@ -380,7 +386,7 @@ impl<D: Domain> Arguments<'_, D> {
                     Some((place, kinds.next()?.clone()))
                 })
             };
-            // What does not fit is said to be so by the world: "a Fridge cannot be picked up".
+            // If it does not fit, the world says so: "a Fridge cannot be picked up".
             let unfit = || {
                 let mut left = (0..self.types.len()).filter(|place| !used.contains(place));
                 left.find_map(|place| Some((place, self.types[place].first()?.clone())))
@@ -441,21 +447,21 @@ impl<D: Domain> Arguments<'_, D> {
         found
     }
 
-    /// Whether a mention is named as where a way ends: "to the sink", "back to the sink".
+    /// Whether a mention is the end of a way: "to the sink", "back to the sink".
     fn is_way_to(&self, place: usize) -> bool {
         let before = self.before(place);
         let Some((last, rest)) = before.split_last() else { return false };
         let passed = |word: &&str| {
             self.lists.passed.contains(*word) || self.lists.verb_particles.contains(*word)
         };
-        // Before the first mention stands the verb.
+        // The verb is before the first mention.
         let rest = if place == 0 { rest.get(1..).unwrap_or(&[]) } else { rest };
         place < self.types.len()
             && self.lists.destination.contains(*last)
             && rest.iter().all(passed)
     }
 
-    /// Whether the words say where to, and name nothing that is known: "to the dishwasher".
+    /// Whether the words give a direction to something unknown: "to the dishwasher".
     fn unknown_way(&self, words: &[&str]) -> bool {
         let aside = |word: &str| {
             self.lists.stop.contains(word)
@@ -484,7 +490,7 @@ impl<D: Domain> Arguments<'_, D> {
         })
     }
 
-    /// Whether words that name nothing known stand between the verb and the first preposition.
+    /// Whether there are words that name nothing known between the verb and the first preposition.
     fn names_unknown(&self) -> bool {
         let adjectives = &self.domain.lexicon(self.edition).adjectives;
         let grammar = Grammar { lists: self.lists, adjectives };

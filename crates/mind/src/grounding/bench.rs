@@ -13,17 +13,18 @@ use crate::language::{
 };
 use crate::parser::{Parse, Scored, SemanticParser};
 use crate::world::{
-    Domain, Edition, Infeasible, Lexicon, Meaning, SeedSet, Stage, StageError, Thing, View,
+    Edition, Features, Infeasible, Lexicon, Meaning, Pointing, SeedSet, Show, Stage, StageError,
+    Thing, View, Words, World, refuse_other_instances,
 };
 
-pub struct Bench {
+pub(crate) struct Bench {
     signature: Signature,
     lexicon: Lexicon,
     seeds: SeedSet,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Scene {
+pub(crate) struct Scene {
     pub here: BTreeSet<Symbol>,
     pub far: BTreeSet<Symbol>,
     pub held: Option<Symbol>,
@@ -32,7 +33,7 @@ pub struct Scene {
 
 impl Scene {
     /// - `things`: names of types; `*Block` is far away.
-    pub fn with(things: &str) -> Scene {
+    pub(crate) fn with(things: &str) -> Scene {
         let named = |far| {
             let things = things.split(' ').filter(move |thing| thing.starts_with('*') == far);
             things.map(|thing| Symbol::new(thing.trim_start_matches('*'))).collect()
@@ -40,7 +41,7 @@ impl Scene {
         Scene { here: named(false), far: named(true), held: None, on: BTreeSet::new() }
     }
 
-    pub fn holding(mut self, thing: &str) -> Scene {
+    pub(crate) fn holding(mut self, thing: &str) -> Scene {
         self.held = Some(Symbol::new(thing));
         self.here.remove(thing);
         self
@@ -48,7 +49,7 @@ impl Scene {
 }
 
 impl Bench {
-    pub fn new() -> Bench {
+    pub(crate) fn new() -> Bench {
         let names = [
             ("block", "Block Brick"),
             ("red block", "Brick"),
@@ -96,13 +97,13 @@ impl Bench {
 }
 
 impl Bench {
-    pub fn with_seeds(seeds: &[(&str, &str)]) -> Bench {
+    pub(crate) fn with_seeds(seeds: &[(&str, &str)]) -> Bench {
         let seeds = SeedSet { exemplars: exemplars(seeds), ..SeedSet::default() };
         Bench { seeds, ..Bench::new() }
     }
 }
 
-pub fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
+pub(crate) fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
     let exemplar = |(utterance, program): &(&str, &str)| Exemplar {
         utterance: LiftedUtterance::parse(utterance),
         program: program.parse().unwrap(),
@@ -110,84 +111,60 @@ pub fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
     pairs.iter().map(exemplar).collect()
 }
 
-pub fn say(text: &str) -> Utterance {
+pub(crate) fn say(text: &str) -> Utterance {
     Utterance::new(text).unwrap()
 }
 
-impl Domain for Bench {
+impl World for Bench {
     type Scene = Scene;
     type Task = ();
 
     fn id(&self) -> &'static str {
         "bench"
     }
+
     fn version(&self) -> u16 {
         1
     }
+
     fn signature(&self) -> &Signature {
         &self.signature
     }
-    fn lexicon(&self, _: Edition) -> &Lexicon {
-        &self.lexicon
-    }
-    fn seeds(&self) -> &SeedSet {
-        &self.seeds
-    }
+
     fn stage(&self, request: &Stage) -> Result<(Scene, ()), StageError> {
         panic!("the bench sets no stage, asked for {request:?}")
     }
 
-    fn step(&self, scene: &mut Scene, _: &(), step: &Step) -> Result<Vec<String>, Infeasible> {
-        let thing = &step.args[0];
-        let refuse = |reason: String| Err(Infeasible::because(reason));
-        let present = scene.here.contains(thing) || scene.held.as_ref() == Some(thing);
-        if step.operator == "GO" {
-            if !present && !scene.far.remove(thing) {
-                return refuse(format!("there is no {thing}"));
-            }
-            scene.here.insert(thing.clone());
-            return Ok(vec![thing.to_string()]);
-        }
-        if scene.far.contains(thing) {
-            let first = Some(format!("GO {thing}").parse().unwrap());
-            let reason = format!("the {thing} is too far away");
-            return Err(Infeasible { reason, first, first_on: Vec::new(), done: false });
-        }
-        if !present {
-            return refuse(format!("there is no {thing}"));
-        }
-        match step.operator.as_str() {
-            "TAKE" => match &scene.held {
-                Some(held) => return refuse(format!("the hand already holds the {held}")),
-                None if ["Lamp", "Table", "Brick"].contains(&thing.as_str()) => {
-                    return refuse(format!("the {thing} is too heavy"));
-                }
-                None => {
-                    scene.here.remove(thing);
-                    scene.held = Some(thing.clone());
-                }
-            },
-            "PUT" if scene.held.as_ref() != Some(thing) => {
-                return refuse(format!("the hand does not hold the {thing}"));
-            }
-            "PUT" => {
-                scene.held = None;
-                scene.here.insert(thing.clone());
-            }
-            _ if thing != "Lamp" => return refuse(format!("the {thing} has no switch")),
-            _ if !scene.on.remove(thing) => {
-                scene.on.insert(thing.clone());
-            }
-            _ => {}
-        }
-        Ok(step.args.iter().map(Symbol::to_string).collect())
+    fn step_on(
+        &self,
+        scene: &mut Scene,
+        _: &(),
+        step: &Step,
+        on: &[Option<String>],
+    ) -> Result<Vec<String>, Infeasible> {
+        refuse_other_instances(scene, step, on, |scene| act(scene, step))
     }
 
     fn achieved(&self, _: &Scene, _: &()) -> bool {
         false
     }
+
     fn plan(&self, _: &Scene, _: &()) -> Option<Program> {
         None
+    }
+
+    fn digest(&self, scene: &Scene) -> Digest {
+        Digest::of(format!("{scene:?}").as_bytes())
+    }
+}
+
+impl Words for Bench {
+    fn lexicon(&self, _: Edition) -> &Lexicon {
+        &self.lexicon
+    }
+
+    fn seeds(&self) -> &SeedSet {
+        &self.seeds
     }
 
     fn resolve(&self, _: Edition, scene: &Scene, mention: &Mention) -> Vec<Symbol> {
@@ -198,15 +175,20 @@ impl Domain for Bench {
         if types.is_empty() { mention.types.clone() } else { types }
     }
 
+    fn present(&self, scene: &Scene) -> BTreeSet<Symbol> {
+        scene.here.iter().chain(&scene.far).chain(&scene.held).cloned().collect()
+    }
+
     fn held(&self, scene: &Scene) -> Option<Symbol> {
         scene.held.clone()
     }
-    fn feature_count(&self) -> usize {
-        2
+
+    fn here(&self, _: &Scene) -> Option<Symbol> {
+        None
     }
-    fn features(&self, scene: &Scene, program: &Program) -> Vec<f32> {
-        let far = program.steps.iter().any(|step| scene.far.contains(&step.args[0]));
-        vec![f32::from(u8::from(scene.held.is_some())), f32::from(u8::from(far))]
+
+    fn fits(&self, _: &Symbol, _: usize, _: &Symbol) -> bool {
+        true
     }
 
     fn contradiction(
@@ -221,12 +203,39 @@ impl Domain for Bench {
         (off && !scene.on.contains(thing)).then(|| (step, format!("the {thing} is already off")))
     }
 
-    fn digest(&self, scene: &Scene) -> Digest {
-        Digest::of(format!("{scene:?}").as_bytes())
+    fn is_on(&self, _: &Scene, _: &Step) -> bool {
+        false
     }
+
+    fn unlike(&self, _: &Scene, _: &Symbol, _: &str) -> bool {
+        false
+    }
+
+    fn choose(&self, _: &Scene, _: &Symbol, _: &Pointing) -> Result<Option<String>, String> {
+        Ok(None)
+    }
+
+    fn is_instance_word(&self, _: &str) -> bool {
+        false
+    }
+}
+
+impl Features for Bench {
+    fn feature_count(&self) -> usize {
+        2
+    }
+
+    fn features(&self, scene: &Scene, program: &Program) -> Vec<f32> {
+        let far = program.steps.iter().any(|step| scene.far.contains(&step.args[0]));
+        vec![f32::from(u8::from(scene.held.is_some())), f32::from(u8::from(far))]
+    }
+}
+
+impl Show for Bench {
     fn goal(&self, _: &()) -> String {
         "do nothing".to_owned()
     }
+
     fn progress(&self, _: &Scene, _: &()) -> Vec<(String, bool)> {
         Vec::new()
     }
@@ -247,8 +256,55 @@ impl Domain for Bench {
     }
 }
 
+/// Carries one primitive out. It changes nothing when it refuses.
+fn act(scene: &mut Scene, step: &Step) -> Result<Vec<String>, Infeasible> {
+    let thing = &step.args[0];
+    let refuse = |reason: String| Err(Infeasible::because(reason));
+    let present = scene.here.contains(thing) || scene.held.as_ref() == Some(thing);
+    if step.operator == "GO" {
+        if !present && !scene.far.remove(thing) {
+            return refuse(format!("there is no {thing}"));
+        }
+        scene.here.insert(thing.clone());
+        return Ok(vec![thing.to_string()]);
+    }
+    if scene.far.contains(thing) {
+        let first = Some(format!("GO {thing}").parse().unwrap());
+        let reason = format!("the {thing} is too far away");
+        return Err(Infeasible { reason, first, first_on: Vec::new(), done: false });
+    }
+    if !present {
+        return refuse(format!("there is no {thing}"));
+    }
+    match step.operator.as_str() {
+        "TAKE" => match &scene.held {
+            Some(held) => return refuse(format!("the hand already holds the {held}")),
+            None if ["Lamp", "Table", "Brick"].contains(&thing.as_str()) => {
+                return refuse(format!("the {thing} is too heavy"));
+            }
+            None => {
+                scene.here.remove(thing);
+                scene.held = Some(thing.clone());
+            }
+        },
+        "PUT" if scene.held.as_ref() != Some(thing) => {
+            return refuse(format!("the hand does not hold the {thing}"));
+        }
+        "PUT" => {
+            scene.held = None;
+            scene.here.insert(thing.clone());
+        }
+        _ if thing != "Lamp" => return refuse(format!("the {thing} has no switch")),
+        _ if !scene.on.remove(thing) => {
+            scene.on.insert(thing.clone());
+        }
+        _ => {}
+    }
+    Ok(step.args.iter().map(Symbol::to_string).collect())
+}
+
 /// Compares lifted utterances by the words they share; no training.
-pub struct Overlap {
+pub(crate) struct Overlap {
     pub exemplars: Vec<Exemplar>,
     pub threshold: f32,
 }

@@ -1,17 +1,23 @@
-//! Taking a thing somewhere: never a walk without it.
+//! Verbs of carrying. They take the thing along, and never only walk.
 
 use super::arguments::{Arguments, Filling};
 use super::settings::Carrying;
 use crate::language::{Grammar, Program, Step, Symbol};
-use crate::world::Domain;
+use crate::world::Words;
 
-impl<D: Domain> Arguments<'_, D> {
-    /// What taking a thing somewhere means: never a walk without it.
+impl<D: Words> Arguments<'_, D> {
+    /// The program of a clause with a verb of carrying. It takes the thing along, and never only
+    /// walks.
     ///
-    /// - `operator`: as what the clause is read.
-    /// - `last`: whether nothing more is asked for behind this clause.
-    /// - returns: none when the clause is about nothing of the kind.
-    pub fn carry(&self, carrying: &Carrying, operator: &Symbol, last: bool) -> Option<Filling> {
+    /// - `operator`: the primitive that the clause is read as.
+    /// - `last`: whether this is the last clause.
+    /// - returns: none for a clause without such a verb.
+    pub(super) fn carry(
+        &self,
+        carrying: &Carrying,
+        operator: &Symbol,
+        last: bool,
+    ) -> Option<Filling> {
         let roles = &self.domain.lexicon(self.edition).roles;
         let operators = [&roles.going, &roles.taking, &roles.putting].map(Option::as_ref);
         let [Some(going), Some(taking), Some(putting)] = operators else { return None };
@@ -44,7 +50,8 @@ impl<D: Domain> Arguments<'_, D> {
         Some(Filling { programs: vec![Program { steps }], penalty: 0.0 })
     }
 
-    /// Whether the verb leaves what it carries, and which mention is where to; none for another verb.
+    /// Whether the verb leaves the thing at the place, and which mention is the place; none for
+    /// another verb.
     fn carries(&self, carrying: &Carrying) -> Option<(bool, Option<usize>)> {
         let grammar = Grammar {
             lists: self.lists,
@@ -66,7 +73,7 @@ impl<D: Domain> Arguments<'_, D> {
         if !direct || purpose || self.is_joined(1) {
             return None;
         }
-        // "The cup on the desk" is taken from there, "into the sink" is where to.
+        // "On the desk" is where the cup is taken from, "into the sink" is where it goes.
         let says_to =
             |word: &str| self.lists.destination.contains(word) || matches!(word, "into" | "onto");
         let says_in = |word: &str| self.lists.inside.contains(word) || word == "on";
@@ -81,7 +88,7 @@ impl<D: Domain> Arguments<'_, D> {
         let places = 1..self.types.len();
         let to = places.clone().find(|&place| behind(place, &says_to));
         let place = to.or_else(|| places.clone().find(|&place| leaves && behind(place, &says_in)));
-        // "Carry the tomato with the plate to the sink" says more than that.
+        // "Carry the tomato with the plate to the sink" asks for more.
         let explained = |between: usize| {
             let before = self.before(between);
             let from = before.last().is_some_and(|word| {

@@ -1,11 +1,11 @@
-//! Which of several things of a kind a reading acts on, where words choose one.
+//! The thing that a reading acts on where words choose one of several of a kind.
 
 use std::collections::BTreeMap;
 
 use super::combine::{Ground, Offer, Partial, Verdict};
 use super::pointing::pointing;
 use crate::language::{Clause, Grammar, Program, Step, Symbol, WordLists};
-use crate::world::{Domain, Lexicon, Pointing};
+use crate::world::{Lexicon, Pointing, Words};
 
 /// Which thing of a type the words of a clause choose.
 #[derive(Debug, Clone, Default)]
@@ -20,7 +20,7 @@ impl Chosen {
     }
 }
 
-impl<D: Domain> Ground<'_, D> {
+impl<D: Words> Ground<'_, D> {
     /// "The lamp on the dresser": of the types that share a name, one that is there comes first.
     pub(super) fn prefer_what_is_there(
         &self,
@@ -53,7 +53,7 @@ impl<D: Domain> Ground<'_, D> {
 
     /// Which things the words of the clause choose, of the types that a program acts on.
     ///
-    /// - `strictly`: whether a state that nothing is known of is one that nothing is in.
+    /// - `strictly`: see [`Pointing::strictly`].
     /// - errors: a sentence, when nothing here is as the words say.
     pub(super) fn choose(
         &self,
@@ -68,7 +68,7 @@ impl<D: Domain> Ground<'_, D> {
             return Ok(chosen);
         };
         let domain = self.moment.domain;
-        // What this utterance did before the clause is newest.
+        // Things that the clauses before handled are the newest.
         let mut handled: Vec<String> = match &partial.candidate.verdict {
             Verdict::Runs { bindings, .. } => bindings.iter().flatten().rev().cloned().collect(),
             _ => Vec::new(),
@@ -79,7 +79,7 @@ impl<D: Domain> Ground<'_, D> {
             let pronoun = offer.clause.mentions.get(place).is_some_and(|m| m.pronoun);
             let acts_on = |kind: &&Symbol| program.steps.iter().any(|s| s.args.contains(kind));
             let kind = kinds.iter().find(acts_on);
-            // The first of its kind is the one: "the bowl beside the other bowl".
+            // The first mention of a kind counts: "the bowl beside the other bowl".
             let Some(kind) = kind.filter(|kind| !pronoun && !seen.contains(kind)) else {
                 continue;
             };
@@ -99,7 +99,7 @@ impl<D: Domain> Ground<'_, D> {
                 }
             }
             let found = domain.choose(&partial.scene, kind, &pointing).or_else(|reason| {
-                // What a lesson changes ("wash the dirty mug") is no reason against it.
+                // A lesson may change the state that the words name ("wash the dirty mug").
                 let bare = Pointing { words: Vec::new(), ..pointing.clone() };
                 match offer.seed {
                     true => Err(reason),

@@ -11,14 +11,16 @@ use crate::language::{
     Answerer, Clause, LiftedProgram, LiftedUtterance, Program, Symbol, Word, WordLists,
 };
 use crate::limits::{COMBINATIONS_MAX, PROGRAM_STEPS_MAX, TYPE_CHOICES_MAX};
-use crate::world::{Domain, Edition, Pointing};
+use crate::world::{Edition, Pointing, Words};
 
 /// A lifted program that the parser offers for a clause.
 #[derive(Debug, Clone)]
-pub struct Offer<'a> {
+pub(super) struct Offer<'a> {
     /// The clause in the reading that the program was found for.
     pub clause: &'a Clause,
+    /// What it means.
     pub program: LiftedProgram,
+    /// How far the exemplar is; no unit.
     pub distance: f32,
     /// Whether the clause has exactly the exemplar's lifted form.
     pub exact: bool,
@@ -30,69 +32,89 @@ pub struct Offer<'a> {
     pub by: Option<Answerer>,
     /// The words of the exemplar that it comes from, where they are known.
     pub taught: Option<&'a LiftedUtterance>,
-    /// Words of clauses that it has nothing for, though it is of the whole utterance.
+    /// The words of left-out clauses, where the offer answers the whole utterance.
     pub dropped: Vec<String>,
 }
 
 impl Offer<'_> {
     /// Whether the words are those of the exemplar, and not only near enough to decide.
-    pub fn is_literal(&self) -> bool {
+    pub(super) fn is_literal(&self) -> bool {
         self.exact && !self.open
     }
 }
 
 /// How clauses are put together.
-pub struct Context<'a> {
+pub(super) struct Context<'a> {
+    /// How a program is run.
     pub execution: &'a Execution,
     /// For choosing the arguments of open programs.
     pub lists: Option<&'a WordLists>,
-    /// What in the utterance asks for more, less or other than one step can say.
+    /// Words of amount in the utterance, which no single step can satisfy.
     pub amounts: &'a [String],
     /// The distance of a chain from that of its first clauses and the next one's.
     pub chain: &'a dyn Fn(f32, f32) -> f32,
-    /// Of the domain's words.
+    /// Of the world's words.
     pub edition: Edition,
 }
 
-/// A ground program for the whole utterance, and what the world says to it.
+/// A program for the whole utterance with all slots filled, and what the world says to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
+    /// All of its clauses.
     pub program: Program,
-    /// That of the chain of its clauses.
+    /// The distance of the chain of its clauses; no unit.
     pub distance: f32,
+    /// Whether every clause was read as a seed.
     pub seed: bool,
-    /// Whether all of its words were exactly an exemplar's, clause by clause.
+    /// Whether every clause has exactly the lifted form of its exemplar.
     pub exact: bool,
+    /// What the world says to it.
     pub verdict: Verdict,
+    /// The clauses that it answers.
     pub lifted: Vec<LiftedUtterance>,
-    /// Which part of the parser gave each clause's program; empty where it has no parts.
+    /// Per clause the part of the parser that answered; empty for a parser without parts.
     pub answered_by: Vec<Answerer>,
     /// What was named last, for a later "it".
     pub mentioned: Option<Symbol>,
     /// Whether the words of every clause were those of an exemplar.
     pub literal: bool,
-    /// The words that it would pass over; it is then not taken.
+    /// The words that it has no use for. A candidate with such words is not taken.
     pub left_over: Vec<String>,
 }
 
+/// What the world says to a program.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// It runs; per step the things it acts on, and those of them that words chose.
-    Runs { bindings: Vec<Vec<String>>, chosen: Vec<Vec<Option<String>>> },
-    /// The words make sense and the world forbids the 0-based `step`. `mendable`: another step
-    /// first, such as going there, would allow it.
-    Forbidden { step: u32, reason: String, mendable: bool },
+    /// It runs.
+    Runs {
+        /// Per step the names of the things it acts on.
+        bindings: Vec<Vec<String>>,
+        /// Per step and argument the thing that words chose.
+        chosen: Vec<Vec<Option<String>>>,
+    },
+    /// The words make sense, but the world does not allow one of its steps.
+    Forbidden {
+        /// The step; 0-based.
+        step: u32,
+        /// A sentence that names the object and the reason.
+        reason: String,
+        /// Whether another step before it, such as going there, would allow it.
+        mendable: bool,
+    },
     /// The words do not fill the program.
-    Unfilled { reason: String },
+    Unfilled {
+        /// A sentence that says what is missing.
+        reason: String,
+    },
 }
 
-/// The cross product of the clauses' offers, each combination grounded and run on a copy of the
-/// scene (paper, section 3.1.3). A clause is grounded in the scene that the clauses before it lead
-/// to, so "it" follows the hand.
+/// All combinations of the clauses' offers. Each is filled and run on a copy of the scene (paper,
+/// section 3.1.3). A clause is filled in the scene after the clauses before it, so "it" means what
+/// is then in the hand.
 ///
 /// - returns: at most [`COMBINATIONS_MAX`], in the order of the offers, the last clause's varying
 ///   fastest.
-pub fn combine<D: Domain>(
+pub(super) fn combine<D: Words>(
     moment: &Moment<'_, D>,
     context: &Context<'_>,
     clauses: &[Vec<Offer<'_>>],
@@ -122,13 +144,15 @@ pub fn combine<D: Domain>(
 
 /// The first clauses of a combination, and the scene they lead to.
 pub(super) struct Partial<S> {
+    /// After the first clauses.
     pub scene: S,
+    /// What these clauses are read as.
     pub candidate: Candidate,
-    /// What clauses were answered with by a lesson.
+    /// The programs of clauses that a lesson answered.
     pub lessons: Vec<Program>,
 }
 
-fn extend<D: Domain>(
+fn extend<D: Words>(
     ground: &Ground<'_, D>,
     clauses: &[Vec<Offer<'_>>],
     partial: &Partial<D::Scene>,
@@ -169,12 +193,14 @@ fn extend<D: Domain>(
     }
 }
 
-pub(super) struct Ground<'a, D: Domain> {
+pub(super) struct Ground<'a, D: Words> {
+    /// When it is said.
     pub moment: &'a Moment<'a, D>,
+    /// How clauses are put together.
     pub context: &'a Context<'a>,
 }
 
-impl<D: Domain> Ground<'_, D> {
+impl<D: Words> Ground<'_, D> {
     /// Grounds one more clause. Once a step is forbidden nothing more is run, but the program is
     /// completed, so that the answer can show all of what was understood.
     ///

@@ -4,10 +4,13 @@ use super::chosen::Chosen;
 use crate::language::{LiftedArg, LiftedProgram, Mention, Program, Step, Symbol};
 use crate::limits::TYPE_CHOICES_MAX;
 
-/// A lifted program with its slots filled, as far as that went.
+/// A lifted program with its slots filled as far as possible.
 pub(super) struct Filled {
+    /// With the words of unfilled slots in their places.
     pub program: Program,
+    /// Which things words chose.
     pub chosen: Chosen,
+    /// Why it is not complete, if it is not.
     pub missing: Option<Missing>,
 }
 

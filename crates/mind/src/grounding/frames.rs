@@ -1,5 +1,5 @@
-//! What people put around a request: addresses, courtesies, fillers. It is taken away before
-//! anything is lifted, so that a lesson and a later request meet in their bare forms.
+//! Phrases around a request: addresses, courtesies, fillers. They are removed before anything is
+//! lifted, so that a lesson and a later request have the same form.
 
 use std::collections::BTreeSet;
 
@@ -11,18 +11,18 @@ use crate::language::{WordLists, is_mark};
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frames {
-    /// Where a request begins: "could you please", "robot", "ok". Those of several words also where
-    /// a later clause begins.
+    /// At the beginning of an utterance: "could you please", "robot", "ok". Phrases of several
+    /// words also at the beginning of a later clause.
     pub openers: BTreeSet<String>,
-    /// The same before a verb in -ing: "would you mind".
+    /// At the beginning, before a verb in -ing: "would you mind".
     pub gerunds: BTreeSet<String>,
-    /// Where an utterance ends: "for me", "thank you".
+    /// At the end of an utterance: "for me", "thank you".
     pub closers: BTreeSet<String>,
     /// Anywhere: "please".
     pub fillers: BTreeSet<String>,
     /// Before another verb: "go and", "come".
     pub going: BTreeSet<String>,
-    /// Words behind which an opener is none: "next TO the sink".
+    /// Words after which a phrase is not an opener: "next TO the sink".
     pub unless_before: BTreeSet<String>,
 }
 
@@ -31,18 +31,19 @@ pub struct Frames {
 pub(super) struct Framed {
     /// Words and clause marks.
     pub tokens: Vec<String>,
-    /// What was taken away, phrase by phrase.
+    /// The removed phrases, in order.
     pub frames: Vec<String>,
 }
 
 impl Framed {
-    pub fn bare(tokens: Vec<String>) -> Framed {
+    /// Words without frames.
+    pub(super) fn bare(tokens: Vec<String>) -> Framed {
         Framed { tokens, frames: Vec::new() }
     }
 }
 
 impl Frames {
-    /// Takes the frames away. One word at least is always left.
+    /// Removes the frames. At least one word stays.
     ///
     /// - `says`: whether a word says something that must not be taken for a name ("tomorrow, …").
     pub(super) fn strip(
@@ -57,7 +58,7 @@ impl Frames {
         framed
     }
 
-    /// Takes one opener away.
+    /// Removes one opener.
     fn open(
         &self,
         framed: &mut Framed,
@@ -109,7 +110,7 @@ impl Frames {
         next.is_some_and(|next| self.unless_before.contains(next))
     }
 
-    /// "Alfred, open the fridge": one word that nobody knows before a comma.
+    /// "Alfred, open the fridge": one unknown word before a comma.
     fn address(
         &self,
         framed: &mut Framed,

@@ -10,20 +10,23 @@ use crate::language::{
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
 use crate::parser::{Parse, Scored, SemanticParser};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Features, Words};
 
-/// All that an interpretation needs beside the moment and the words: the parts of a mind.
+/// The parts of a mind that interpret an utterance.
 pub struct Interpreter<'a, P> {
+    /// How the utterance is lifted.
     pub abstraction: &'a Abstraction,
+    /// How a program is run.
     pub execution: &'a Execution,
+    /// Finds programs for lifted clauses.
     pub parser: &'a P,
-    /// Whether a word is in ordinary use, and so no misspelt name.
+    /// Whether a word is in ordinary use, and so not a misspelt name.
     pub known: &'a dyn Fn(&str) -> bool,
     /// None before the first lesson.
     pub reranker: Option<&'a Reranker>,
     /// How many of the parser's exemplars, from the first, are seeds.
     pub seeds: u32,
-    /// Of the domain's words.
+    /// Of the world's words.
     pub edition: Edition,
 }
 
@@ -31,9 +34,13 @@ impl<P: SemanticParser> Interpreter<'_, P> {
     /// What an utterance asks for at this moment, and why.
     ///
     /// Abstract, parse (whole, then split), resolve, combine, keep the feasible, rerank (paper,
-    /// section 3.1). An exact lifted match decides, subject only to what the world allows; without
-    /// a reranker the nearest feasible candidate wins. Nothing is carried out here.
-    pub fn interpret<D: Domain>(&self, moment: &Moment<'_, D>, utterance: &Utterance) -> Answer {
+    /// section 3.1). An exact lifted match is taken if the world allows it. Without a reranker, the
+    /// nearest feasible candidate is taken. The scene itself does not change.
+    pub fn interpret<D: Words + Features>(
+        &self,
+        moment: &Moment<'_, D>,
+        utterance: &Utterance,
+    ) -> Answer {
         let heard = self.hear(moment, utterance, Ways::Deciding);
         let lessons_alone = match &heard.abstracted.mood {
             None => false,
@@ -78,8 +85,8 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         }
         // Candidates are sorted: the first forbidden one is the best guess at what was meant.
         let is_forbidden = |c: &&Candidate| matches!(c.verdict, Verdict::Forbidden { .. });
-        // A reading that passes words over says that they were not understood, not that the world
-        // forbids something else.
+        // A reading with unused words says that they were not understood. It does not say what the
+        // world does not allow.
         let left = candidates.first().is_some_and(|first| !first.left_over.is_empty());
         let told = chosen.or_else(|| candidates.iter().find(is_forbidden).filter(|_| !left));
         let outcome = told.map_or(Outcome::NotSure, outcome_of);
@@ -103,9 +110,9 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         Answer { outcome, evidence, mentioned, chosen }
     }
 
-    /// Every candidate that runs, nearest first, exact or not: what the reranker learns to choose
-    /// from.
-    pub fn candidates<D: Domain>(
+    /// Every candidate that runs, nearest first, exact or not. The reranker learns to choose from
+    /// them.
+    pub fn candidates<D: Words + Features>(
         &self,
         moment: &Moment<'_, D>,
         utterance: &Utterance,
@@ -129,7 +136,12 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         }
     }
 
-    fn hear<D: Domain>(&self, moment: &Moment<'_, D>, said: &Utterance, ways: Ways) -> Heard<'_> {
+    fn hear<D: Words + Features>(
+        &self,
+        moment: &Moment<'_, D>,
+        said: &Utterance,
+        ways: Ways,
+    ) -> Heard<'_> {
         let lexicon = moment.domain.lexicon(self.edition);
         let abstracted = Abstractor::new(lexicon, self.abstraction, self.known).read(said);
         let grammar = self.abstraction.lists.as_ref();
@@ -137,7 +149,7 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         let listen = |clause| self.listen(clause, grammar.as_ref(), &lexicon.roles);
         let whole = listen(abstracted.whole());
         let parts = match abstracted.clauses(self.abstraction.split, grammar) {
-            // An exact match of the whole needs no second opinion from its parts.
+            // After an exact match of the whole, its parts are not looked at.
             Some(parts) if !whole.literal() || ways == Ways::All => parts,
             _ => Vec::new(),
         };
@@ -162,8 +174,8 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         ParsedClause { readings: readings.map(parse).collect() }
     }
 
-    /// A verb that takes a thing along is a way to where it goes, however rarely people use it; the
-    /// things decide what else it is.
+    /// A verb of carrying is a way to a place, even if people rarely use it for GOTO. The things it
+    /// names decide what else it means.
     fn carries(&self, clause: &Clause, grammar: &Grammar<'_>, roles: &Roles) -> Option<Scored> {
         let carrying = self.execution.carrying.as_ref()?;
         let verb = grammar.main_verb(&clause.lifted.words)?.word;
@@ -177,8 +189,9 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         alone.then_some(scored)
     }
 
-    /// Grounds each way of reading the utterance; equal programs are kept once, nearest first.
-    fn ground<D: Domain>(
+    /// Fills and runs each way of reading the utterance. Equal programs are kept once, nearest
+    /// first.
+    fn ground<D: Words + Features>(
         &self,
         moment: &Moment<'_, D>,
         heard: &Heard<'_>,
@@ -208,7 +221,7 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         // Stable: at equal distance the whole utterance comes before its parts, and within each
         // the older exemplar first.
         all.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        // A chain of clauses that are near enough one by one may not be.
+        // Clauses may be near enough one by one, and their chain too far.
         all.retain(|candidate| candidate.distance <= threshold);
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in all {
@@ -223,7 +236,7 @@ impl<P: SemanticParser> Interpreter<'_, P> {
 /// Which ways of reading an utterance are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ways {
-    /// Those that may decide what it means.
+    /// The ways that may decide what it means.
     Deciding,
     All,
 }
@@ -304,8 +317,8 @@ impl Heard<'_> {
         !self.parts.is_empty() && self.parts.iter().all(ParsedClause::exact)
     }
 
-    /// The ways of reading the utterance that may decide what it means, in turns: a later turn
-    /// counts only when nothing of the earlier ones runs.
+    /// The ways of reading the utterance that may decide what it means, in rounds. A later round
+    /// counts only if nothing of the earlier ones runs.
     fn deciding(&self) -> Vec<Vec<Vec<Vec<Offer<'_>>>>> {
         let whole = vec![self.whole.deciding(self.seeds)];
         if self.whole.literal() {
@@ -314,7 +327,7 @@ impl Heard<'_> {
         let parts: Vec<_> = self.parts.iter().map(|part| part.deciding(self.seeds)).collect();
         let literal = !self.parts.is_empty() && self.parts.iter().all(ParsedClause::literal);
         match (self.whole.exact(), literal) {
-            // "Pick up the mug and wash it" is what it says, however near it is to "wash it".
+            // "Pick up the mug and wash it" has two parts, even if it is near to "wash it".
             (true, true) => vec![vec![parts], vec![whole]],
             (true, false) => vec![vec![whole], vec![parts]],
             (false, _) if self.parts_exact() => vec![vec![parts]],
@@ -332,16 +345,17 @@ impl Heard<'_> {
         vec![vec![self.whole.offers(self.seeds)], parts]
     }
 
-    /// Notes in every reading of several clauses as one lesson the verbs that it has nothing for.
+    /// In every reading of several clauses as one lesson, notes the verbs that the lesson has no
+    /// use for.
     ///
-    /// A lesson of as many clauses has something for each. Else each verb must be the lesson's or
+    /// A lesson of as many clauses has a use for each. Else each verb must be the lesson's or
     /// another word for it, or what its clause means by itself must be among the lesson's steps.
     fn mark_dropped(&self, ways: &mut [Vec<Vec<Offer<'_>>>], grammar: &Grammar<'_>) {
         let whole = ways.iter_mut().filter(|way| way.len() == 1 && self.parts.len() > 1);
         for offer in whole.flatten().flatten().filter(|offer| !offer.seed && !offer.is_literal()) {
             let Some(taught) = offer.taught else { continue };
             let lesson = Clause::of(taught);
-            // A lesson has lost its marks: its verbs tell its clauses.
+            // A lesson has no marks any more, so its verbs tell its clauses.
             let is_verb =
                 |word: &&Word| matches!(word, Word::Text(t) if grammar.lists.verbs.contains(t));
             let verbs = taught.words.iter().filter(is_verb).count();
@@ -351,12 +365,12 @@ impl Heard<'_> {
             }
             let in_lesson =
                 |verb: &str| taught.words.iter().any(|w| matches!(w, Word::Text(t) if t == verb));
-            // As many clauses as the lesson has may say the same in other words.
+            // As many clauses as the lesson has may be other words for it.
             let mut other_words = clauses;
             let mut unexplained = Vec::new();
             for part in &self.parts {
                 let Some(verb) = grammar.main_verb(&part.lifted().words) else { continue };
-                // "Wait" and "let it cool" are nothing to do.
+                // "Wait" and "let it cool" ask for no step.
                 let lists = grammar.lists;
                 if lists.lasting.contains(&verb.word) || lists.purposes.contains(&verb.word) {
                     continue;
@@ -379,9 +393,9 @@ impl Heard<'_> {
         }
     }
 
-    /// Whether a lesson may answer an utterance of this mood: one with exactly its words, or a long
-    /// instruction of which only a later part waits for something ("…, and take it out when it is
-    /// done"). "If it is dirty, take it, wash it and put it back" waits from the beginning.
+    /// Whether a lesson may answer an utterance of this mood. It may if the words are exactly its
+    /// own, or if only a later part of a long instruction has a condition ("…, and take it out when
+    /// it is done"). "If it is dirty, take it, wash it and put it back" has one from the beginning.
     fn may_be_told(&self, mood: &Mood) -> bool {
         let (Mood::Conditional { word } | Mood::Reordered { word }) = mood else { return false };
         let first = self.parts.first().map(|part| part.readings[0].0.words.as_slice());
@@ -391,8 +405,8 @@ impl Heard<'_> {
         self.whole.literal() || (waits_later && self.parts.len() >= LONG_CLAUSES_MIN)
     }
 
-    /// The answer to what asks for nothing: it names the words that say so.
-    fn not_asked<D: Domain>(&self, moment: &Moment<'_, D>) -> Answer {
+    /// The answer to an utterance that is not a request. It names the words that show it.
+    fn not_asked<D: Words + Features>(&self, moment: &Moment<'_, D>) -> Answer {
         let mood = self.abstracted.mood.clone();
         let evidence = Evidence {
             lifted: vec![self.whole.lifted().clone()],
@@ -404,8 +418,8 @@ impl Heard<'_> {
         Answer { outcome: Outcome::NotSure, evidence, mentioned, chosen: Vec::new() }
     }
 
-    /// What each word of the utterance was used for by a reading; of a reading that is not taken,
-    /// which words it leaves over.
+    /// What a reading uses each word for; of a reading that is not taken, also which words it has
+    /// no use for.
     fn account(&self, reading: Option<&Candidate>) -> Vec<Accounted> {
         let frames = self.abstracted.frames.iter();
         let mut all: Vec<Accounted> =
@@ -444,7 +458,7 @@ impl Heard<'_> {
         all
     }
 
-    /// Of a word that names nothing: whether it says what to do.
+    /// The use of a word that names nothing: whether it says what to do.
     fn plain_use(&self, text: &str) -> Use {
         match self.lists.as_ref() {
             Some(lists) if lists.verbs.contains(text) || lists.noun_verbs.contains(text) => {
@@ -458,13 +472,14 @@ impl Heard<'_> {
         }
     }
 
-    fn named_last<D: Domain>(&self, moment: &Moment<'_, D>) -> Option<Symbol> {
+    fn named_last<D: Words + Features>(&self, moment: &Moment<'_, D>) -> Option<Symbol> {
         let mentions = &self.whole.readings[0].0.mentions;
         resolve(moment.domain, self.edition, moment.scene, mentions, moment.mentioned).last
     }
 
     /// The part of the evidence that comes from parsing. An utterance that was understood in parts
-    /// is explained by its parts; one that was not, by the parts that nothing was offered for.
+    /// is explained by its parts. One that was not understood is explained by the parts without an
+    /// offer.
     fn evidence(&self, told: Option<&Candidate>) -> Evidence {
         let in_parts = match told {
             Some(candidate) => candidate.lifted.len() > 1,
@@ -506,22 +521,22 @@ fn taught(parse: &Parse, number: u32) -> Option<&LiftedUtterance> {
     parse.nearest.iter().find(|near| near.number == number).map(|near| &near.exemplar)
 }
 
-/// The distance of a way that a verb of carrying gives: not as said, and sure.
+/// The distance of a way that a verb of carrying gives: sure, but not exact.
 const CARRIED_AT: f32 = 0.1;
 /// How many clauses a long instruction has.
 const LONG_CLAUSES_MIN: usize = 3;
-/// How far a reading is that is as good as said.
+/// Up to this distance, a reading counts as exact.
 const SAID_WITHIN: f32 = 0.02;
 
-/// Whether a reading is what was said, and cannot be done: no other reading is then taken in its
-/// place. That is one whose words are an exemplar's or all but, and that the world forbids.
+/// Whether a reading has the words of an exemplar, or nearly so, and the world does not allow it.
+/// No other reading is then taken in its place.
 fn is_final(candidate: &Candidate) -> bool {
     let said = candidate.literal || (candidate.seed && candidate.distance <= SAID_WITHIN);
     said && matches!(candidate.verdict, Verdict::Forbidden { .. })
 }
 
-/// Drops what comes behind a reading that decides, or behind one that passes words over: what is
-/// farther away is not what was said.
+/// Drops the readings after one that decides, and after one with unused words: readings that are
+/// farther away do not have the words that were said.
 fn keep_before_the_final(candidates: &mut Vec<Candidate>) {
     let decides = |c: &Candidate| is_final(c) || (c.seed && !c.left_over.is_empty());
     if let Some(at) = candidates.iter().position(decides) {
@@ -564,7 +579,7 @@ fn discarded(candidates: &[Candidate], told: Option<&Candidate>) -> Vec<Discarde
     let dropped = candidates.iter().filter_map(|candidate| match &candidate.verdict {
         _ if told.is_some_and(|told| told.program == candidate.program) => None,
         Verdict::Runs { .. } => None,
-        // Nothing was made of it: its words are in the accounting.
+        // It has no program; its words are in the accounting.
         _ if candidate.program.steps.is_empty() => None,
         Verdict::Forbidden { reason, .. } | Verdict::Unfilled { reason } => {
             Some(Discarded { program: candidate.program.clone(), reason: reason.clone() })

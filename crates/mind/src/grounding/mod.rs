@@ -1,4 +1,4 @@
-//! Everything that needs both the utterance and the scene: from words to *this* mug.
+//! From an utterance and a scene to a program about certain things: from words to *this* mug.
 //!
 //! [`Interpreter::interpret`] is the pipeline: abstract, parse, resolve, combine, keep what runs,
 //! rerank.

@@ -1,15 +1,18 @@
 use crate::language::Symbol;
-use crate::world::Domain;
+use crate::world::World;
 
-/// The moment an utterance is spoken in: all that its meaning may depend on beside its words.
+/// The moment of an utterance: everything its meaning may depend on, except its words.
 #[derive(Debug)]
-pub struct Moment<'a, D: Domain> {
+pub struct Moment<'a, D: World> {
+    /// The world.
     pub domain: &'a D,
+    /// The scene at that moment.
     pub scene: &'a D::Scene,
+    /// The task of the episode.
     pub task: &'a D::Task,
     /// The type named last: what "it" means while the hand is empty.
     pub mentioned: Option<&'a Symbol>,
-    /// The things that were acted on before in the episode, by name, newest first: what "the other
-    /// one" leaves out and "the same one" means. A name may come again.
+    /// The names of the things acted on before in the episode, newest first; a name may be there
+    /// twice. "The other one" excludes them, and "the same one" means the newest.
     pub handled: &'a [String],
 }

@@ -1,5 +1,5 @@
-//! Whether an utterance asks for something to be done now. What is asked, told, forbidden, or meant
-//! for another time is never carried out.
+//! Whether an utterance is a request for something to be done now. Questions, statements,
+//! prohibitions, and requests for another time are never carried out.
 
 use std::collections::BTreeSet;
 
@@ -8,42 +8,42 @@ use serde::{Deserialize, Serialize};
 use super::frames::Framed;
 use crate::language::{Mood, WordLists, is_mark};
 
-/// Words by which a mood is known. Data of a recipe, in lower case; entries may have several words.
+/// The words that mark a mood. Data of a recipe, in lower case; entries may have several words.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Moods {
-    /// Where an utterance begins that asks: "what", "tell me".
+    /// At the beginning: the utterance is a question: "what", "tell me".
     pub asking: BTreeSet<String>,
-    /// Where an utterance begins, it asks; behind a noun, it tells: "is", "did".
+    /// At the beginning, the utterance is a question; after a noun, it is a statement: "is", "did".
     pub auxiliaries: BTreeSet<String>,
-    /// As an auxiliary, but only before a pronoun: "do you", "have you".
+    /// Auxiliaries only before a pronoun: "do you", "have you".
     pub auxiliaries_or_verbs: BTreeSet<String>,
-    /// Where an utterance begins that tells: "i", "somebody".
+    /// At the beginning: the utterance is a statement: "i", "somebody".
     pub subjects: BTreeSet<String>,
-    /// Of verbs that do not end in -ed.
+    /// Past forms of verbs that do not end in -ed.
     pub past: BTreeSet<String>,
-    /// Anywhere: it was done, it is told.
+    /// Anywhere: the utterance is a statement about the past.
     pub told: BTreeSet<String>,
-    /// Open a part of a sentence in which an auxiliary says nothing of the whole: "that".
+    /// Begin a part of a sentence whose auxiliaries do not count: "that".
     pub relative: BTreeSet<String>,
     /// Anywhere: something is not to be done.
     pub forbidding: BTreeSet<String>,
-    /// The same before a verb in -ing: "stop".
+    /// Before a verb in -ing: something is not to be done: "stop".
     pub ending: BTreeSet<String>,
-    /// Anywhere: it depends on something.
+    /// Anywhere: the request has a condition.
     pub conditions: BTreeSet<String>,
-    /// Anywhere: it is for another time.
+    /// Anywhere: the request is for another time.
     pub times: BTreeSet<String>,
-    /// Anywhere: more, less or other than one step can say: "all", "or", "except".
+    /// Anywhere: an amount that no single step can satisfy: "all", "or", "except".
     pub amounts: BTreeSet<String>,
-    /// Phrases with such a word that mean nothing of the kind: "all the way".
+    /// Phrases with such a word that do not count: "all the way".
     pub idioms: BTreeSet<String>,
-    /// Where an utterance of several clauses ends: what stands last is to be done last, as it would be
-    /// without them. "When you are done", "afterwards".
+    /// At the end of an utterance of several clauses: the order is that of the words. "When you are
+    /// done", "afterwards".
     pub afterwards: BTreeSet<String>,
-    /// Where an utterance begins: its order is not that of the words. "Before".
+    /// At the beginning: the order is not that of the words. "Before".
     pub order_first: BTreeSet<String>,
-    /// The same behind the first word: "after".
+    /// After the first word: the order is not that of the words. "After".
     pub order_later: BTreeSet<String>,
 }
 
@@ -51,6 +51,8 @@ pub struct Moods {
 const DURATION_WORDS: usize = 3;
 
 impl Moods {
+    /// The mood; none for a request for something to be done now.
+    ///
     /// - `text`: as said, for its question mark.
     pub(super) fn of(&self, text: &str, framed: &Framed, lists: &WordLists) -> Option<Mood> {
         let tokens: Vec<&str> = framed.tokens.iter().map(String::as_str).collect();
@@ -146,8 +148,8 @@ impl Moods {
         framed.tokens.truncate(mark);
     }
 
-    /// Takes away that the last of several clauses is to be done last: "wash the mug and put it back
-    /// when you are done". Said of a single request it is a condition, and stays.
+    /// Takes away that the last of several clauses is to be done last: "wash the mug and put it
+    /// back when you are done". Said of a single request it is a condition, and stays.
     pub(super) fn strip_order(&self, framed: &mut Framed, lists: &WordLists) {
         let marks = framed.tokens.iter().rev().take_while(|token| is_mark(token)).count();
         let end = framed.tokens.len() - marks;
@@ -189,7 +191,8 @@ impl Moods {
         {
             return Some(first.to_owned());
         }
-        // "Open the fridge, will you?" was asked politely; of a bare sentence nobody knows.
+        // "Open the fridge, will you?" is a polite request. Without the courtesy, a question mark
+        // makes it a question.
         let polite = !framed.frames.is_empty();
         (text.contains('?') && !polite).then(|| "?".to_owned())
     }
@@ -221,7 +224,7 @@ impl Moods {
                 return None;
             }
             let determined = at > 0 && lists.determiners.contains(tokens[at - 1]);
-            // Nobody asks for something with an article first.
+            // A request does not begin with an article.
             let named_first = lists.determiners.contains(first);
             if at > 0 && is_verb(token) && !gerund && !determined && !is_past(token) && !named_first
             {

@@ -7,18 +7,19 @@ const FORGIVEN_LETTERS_MIN: usize = 5;
 
 /// Finds the lexicon's names in a run of words.
 #[derive(Debug)]
-pub struct Names<'a> {
+pub(super) struct Names<'a> {
     lexicon: &'a Lexicon,
     summary: &'a NameSummary,
 }
 
 impl<'a> Names<'a> {
-    pub fn new(lexicon: &'a Lexicon) -> Names<'a> {
+    /// The names of this lexicon.
+    pub(super) fn new(lexicon: &'a Lexicon) -> Names<'a> {
         Names { lexicon, summary: lexicon.summary() }
     }
 
     /// The longest name or pronoun that `words` starts with, and how many words it takes.
-    pub fn starting(&self, words: &[&str]) -> Option<(usize, Mention)> {
+    pub(super) fn starting(&self, words: &[&str]) -> Option<(usize, Mention)> {
         let first = words.first()?;
         for count in (1..=self.summary.longest.min(words.len())).rev() {
             let window = &words[..count];
@@ -34,7 +35,7 @@ impl<'a> Names<'a> {
     ///
     /// - `known`: whether a word is in ordinary use; such a word is never a misspelt name, or
     ///   "place" would turn into a plate.
-    pub fn misspelt(
+    pub(super) fn misspelt(
         &self,
         words: &[&str],
         known: &dyn Fn(&str) -> bool,

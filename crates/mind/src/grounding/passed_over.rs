@@ -1,27 +1,31 @@
-//! Things that were named and that a reading does not use: it would pass them over, so it is not taken.
+//! Things that were named and that a reading does not use. Such a reading is not taken.
 
 use super::accounting::TOOLS;
 use super::arguments::Arguments;
 use crate::language::{Grammar, LiftedUtterance, Program, Symbol, Word};
-use crate::world::Domain;
+use crate::world::Words;
 
-/// "As well as the drawer" is as much as "and the drawer".
+/// "As well as the drawer" means "and the drawer".
 const JOINING: [&str; 6] = ["plus", "well", "followed", "along", "together", "including"];
 
-impl<D: Domain> Arguments<'_, D> {
-    /// The things that were named as what to act on, and that the program does not use; of a lesson
-    /// also the place where something is to be put, what stands in the place of its fixture, and
-    /// what it is to be done with.
+impl<D: Words> Arguments<'_, D> {
+    /// The things that were named to be acted on and that the program does not use. For a lesson
+    /// also the place where something is to be put, a thing named in the place of its fixture, and
+    /// the tool.
     ///
     /// - `lesson`: its words, if the program is a lesson's.
-    pub fn passed_over(&self, program: &Program, lesson: Option<&LiftedUtterance>) -> Vec<String> {
+    pub(super) fn passed_over(
+        &self,
+        program: &Program,
+        lesson: Option<&LiftedUtterance>,
+    ) -> Vec<String> {
         let uses = |kind: &Symbol| program.steps.iter().any(|step| step.args.contains(kind));
         let mut left = Vec::new();
-        // Whether the mention before was named as where something is.
+        // Whether the mention before was named as the place of something.
         let mut aside = false;
         for (place, mention) in self.clause.mentions.iter().enumerate() {
             let used = self.types[place].iter().chain(&mention.types).any(|kind| {
-                // What is in the hand comes along.
+                // A thing in the hand comes along.
                 uses(kind) || self.held.as_ref() == Some(kind)
             });
             aside = match self.between(place).as_slice() {
@@ -65,8 +69,8 @@ impl<D: Domain> Arguments<'_, D> {
         puts && self.is_place(place) && !self.is_part(place)
     }
 
-    /// Whether something is to be done with a mention, and the lesson was done with nothing: "wash the
-    /// tomato with the FORK", after "wash the mug".
+    /// Whether a mention is a tool, and the lesson has no tool: "wash the tomato with the FORK",
+    /// after "wash the mug".
     fn is_tool_of(&self, lesson: &LiftedUtterance, place: usize) -> bool {
         let with = |word: &&str| TOOLS.contains(word);
         let in_lesson = lesson.words.iter().any(|word| match word {
@@ -78,8 +82,8 @@ impl<D: Domain> Arguments<'_, D> {
         place > 0 && !in_lesson && last.next().is_some_and(with)
     }
 
-    /// Whether a mention stands in the place of a fixture that the lesson names and the clause does not:
-    /// "look into the DRAWER", after a lesson about looking into the fridge.
+    /// Whether a mention is in the place of a fixture that the lesson names and the clause does
+    /// not: "look into the DRAWER", after a lesson about looking into the fridge.
     fn is_instead(&self, lesson: &LiftedUtterance, place: usize) -> bool {
         let said = &self.clause.lifted.words;
         let missing = |word: &&Word| {
@@ -105,8 +109,8 @@ impl<D: Domain> Arguments<'_, D> {
         last.is_some_and(|operator| roles.puts(operator))
     }
 
-    /// Whether a program that only goes somewhere was said to look at something in the light of a
-    /// mention: of something that is switched and holds nothing.
+    /// Whether the words ask to look at something in the light of a mention (a thing that is
+    /// switched and holds nothing), and the program only goes somewhere.
     fn is_lit(&self, program: &Program, place: usize) -> bool {
         let roles = &self.domain.lexicon(self.edition).roles;
         let Some(accounting) = self.accounting else { return false };

@@ -1,7 +1,7 @@
 //! Which of several things of a kind the words of a clause mean.
 
 use crate::language::{Clause, Program, Symbol, Word, WordLists};
-use crate::world::{Domain, Edition, Lexicon, Pointing};
+use crate::world::{Edition, Lexicon, Pointing, Words};
 
 /// Ordinals, from the first.
 const ORDINALS: [&str; 10] =
@@ -15,7 +15,7 @@ const HERE: [&str; 1] = ["here"];
 ///
 /// - `types`: per mention the types that it may mean here.
 /// - `program`: what the clause is read as.
-pub(super) fn pointing<D: Domain>(
+pub(super) fn pointing<D: Words>(
     domain: &D,
     edition: Edition,
     lists: &WordLists,
@@ -76,7 +76,7 @@ fn numbered(word: &str) -> Option<u32> {
 }
 
 /// "The fork THAT IS CLEAN".
-fn stated_behind<D: Domain>(domain: &D, words: &[Word], at: usize) -> Option<String> {
+fn stated_behind<D: Words>(domain: &D, words: &[Word], at: usize) -> Option<String> {
     let text = |at: usize| match words.get(at) {
         Some(Word::Text(text)) => Some(text.as_str()),
         _ => None,
@@ -88,7 +88,7 @@ fn stated_behind<D: Domain>(domain: &D, words: &[Word], at: usize) -> Option<Str
 }
 
 /// The words before a slot that say a state: "the DIRTY fork".
-fn modifiers<D: Domain>(domain: &D, lists: &WordLists, words: &[Word], at: usize) -> Vec<String> {
+fn modifiers<D: Words>(domain: &D, lists: &WordLists, words: &[Word], at: usize) -> Vec<String> {
     let mut found = Vec::new();
     for before in (0..at).rev() {
         let Word::Text(word) = &words[before] else { break };

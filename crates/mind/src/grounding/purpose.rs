@@ -1,5 +1,5 @@
-//! Primitives that somebody spells out may be a means to something that they did not name. Doing
-//! them one by one would then look like understanding.
+//! A person who spells out primitives may have a purpose that the words do not name. The robot
+//! would then carry out the steps without understanding the request.
 
 use crate::language::{Roles, Step, Symbol};
 
@@ -24,14 +24,15 @@ pub(super) fn undoes_itself(roles: &Roles, steps: &[Step]) -> bool {
     false
 }
 
-/// Why several primitives in one utterance are a means to something that nobody named, if they are.
+/// Why several primitives in one utterance have a purpose that was not named; none if they have
+/// not.
 ///
-/// Whoever puts a thing somewhere and then turns something on, or works the same thing twice,
-/// wants what that does to the thing; the steps alone may stop half way. And several things to do
-/// that cannot be done as said were probably not meant as said.
+/// Putting a thing somewhere and then turning something on, or working the same thing twice, is
+/// done for its effect on the thing, and the steps alone may not complete it. Several steps of
+/// which one is not possible were probably not meant as they were said.
 ///
 /// - `clauses`: how many parts of the utterance gave the steps.
-/// - `forbidden`: the world forbids one of them.
+/// - `forbidden`: whether the world does not allow one of them.
 pub(super) fn beyond_steps(
     roles: &Roles,
     steps: &[Step],

@@ -23,6 +23,7 @@ pub struct Choice {
 pub struct RerankerFigures {
     /// Moments with more than one candidate.
     pub choices: usize,
+    /// Full passes over the history.
     pub steps: usize,
     /// Mean cross-entropy, in nats.
     pub loss: f32,

@@ -7,7 +7,7 @@ use crate::numerics::{
     Floats, Linear, Mlp, MlpTrace, Rng, cos, exp, fill_normal, normalise, relu, sin,
 };
 use crate::parser::WordTable;
-use crate::world::Domain;
+use crate::world::Features;
 
 /// The sizes of the reranker and how it is trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,15 +19,16 @@ pub struct RerankerSettings {
     pub symbol: usize,
     /// Full passes over the history.
     pub steps_max: usize,
+    /// How far a step goes.
     pub learning_rate: f32,
     /// Training stops when the mean cross-entropy falls below this many nats.
     pub stop_below: f32,
 }
 
-/// Judges ground programs in a scene: a score from the utterance (word vectors and positions,
-/// transformed and summed), the state features, and the program (learned vectors of its operators
-/// and arguments with their positions, transformed and summed). Only differences between scores
-/// mean anything. Source: the paper, section 3.1.3.
+/// Scores ground programs in a scene. A score depends on the utterance (word vectors and positions,
+/// transformed and summed), on the state features, and on the program (learned vectors of its
+/// operators and arguments with their positions, transformed and summed). Scores can only be
+/// compared with each other. Source: the paper, section 3.1.3.
 #[derive(Debug, Clone)]
 pub struct Reranker {
     words: &'static WordTable,
@@ -35,7 +36,7 @@ pub struct Reranker {
     places: Places,
 }
 
-/// What training found, for storing.
+/// What training found, as it is stored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RerankerWeights {
     /// In order; the row of a symbol in `vectors` is its place plus 1, row 0 is for all others.
@@ -50,10 +51,12 @@ pub struct RerankerWeights {
     pub(super) judge: Mlp,
 }
 
-/// A program with its state features, [`Domain::feature_count`] numbers.
+/// A program with its state features, [`Features::feature_count`] numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Featured {
+    /// What would be carried out.
     pub program: Program,
+    /// What the world says about it.
     pub features: Vec<f32>,
 }
 
@@ -106,6 +109,7 @@ impl Reranker {
         Ok(Reranker { words, weights, places })
     }
 
+    /// What training found.
     pub fn weights(&self) -> &RerankerWeights {
         &self.weights
     }
@@ -113,7 +117,7 @@ impl Reranker {
     /// The 0-based place of the best of `programs`; the first among equals.
     ///
     /// - panics: `programs` is empty.
-    pub fn best<'p, D: Domain>(
+    pub fn best<'p, D: Features>(
         &self,
         moment: &Moment<'_, D>,
         words: &[String],
@@ -148,7 +152,7 @@ impl Reranker {
         weights.judge.forward(candidates.len(), &inputs, &mut trace).to_vec()
     }
 
-    /// Appends a row for each word, its vector plus its position's; returns their number.
+    /// Appends a row for each word: its vector plus its position's. Returns the number of rows.
     pub(super) fn word_rows(&self, words: &[String], rows: &mut Vec<f32>) -> usize {
         let width = self.words.dims();
         let words = words.iter().filter(|word| word.chars().any(char::is_alphanumeric));
@@ -156,7 +160,7 @@ impl Reranker {
         for (word, place) in words.zip(self.places.said.chunks_exact(width)) {
             let start = rows.len();
             rows.extend_from_slice(&self.words.vector(word));
-            // Unit length: frequent words have long vectors, and long sums train badly.
+            // Unit length: frequent words have long vectors, and training fails with long sums.
             normalise(&mut rows[start..]);
             add(&mut rows[start..], place);
             count += 1;
@@ -184,7 +188,7 @@ impl Reranker {
 }
 
 /// The program with what the world says about it.
-pub fn featured<D: Domain>(moment: &Moment<'_, D>, program: &Program) -> Featured {
+pub fn featured<D: Features>(moment: &Moment<'_, D>, program: &Program) -> Featured {
     let features = moment.domain.features(moment.scene, program);
     Featured { program: program.clone(), features }
 }

@@ -1,21 +1,21 @@
 use crate::language::{Mention, Symbol};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
 /// What the mentions of a clause may mean.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Referents {
-    /// Per mention the types it may mean, best first; empty for a pronoun that nothing explains.
+    /// Per mention the types it may mean, best first; empty for a pronoun without anything to mean.
     pub types: Vec<Vec<Symbol>>,
-    /// What was named last, here or before.
+    /// What was named last, in these mentions or before.
     pub last: Option<Symbol>,
 }
 
-/// Entity resolution by scene (paper, section 3.1.1; DESIGN, decision 8): a name means the type
-/// with the closest instance, a pronoun what the robot holds, else what was named last.
+/// Finds what mentions mean in a scene (paper, section 3.1.1): a name means the type with the
+/// closest instance; a pronoun means what the robot holds, else what was named last.
 ///
 /// - `edition`: of the words that the mentions were found with.
 /// - `before`: what was named last before this clause.
-pub fn resolve<D: Domain>(
+pub fn resolve<D: Words>(
     domain: &D,
     edition: Edition,
     scene: &D::Scene,

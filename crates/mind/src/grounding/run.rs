@@ -1,19 +1,22 @@
-//! Carrying a reading out on a copy of the scene: step by step, with what must come first, and
-//! without what holds already.
+//! Carrying a reading out on a copy of the scene, step by step. Missing steps are added before a
+//! step, and steps whose effect holds already are skipped.
 
 use super::chosen::Chosen;
 use super::combine::{Ground, Offer, Verdict};
 use crate::language::{Program, Step};
 use crate::limits::PROGRAM_STEPS_MAX;
-use crate::world::Domain;
+use crate::world::Words;
 
-/// Steps taken unasked before one step that needs them.
+/// The most missing steps that are added before one step.
 const UNASKED_STEPS_MAX: usize = 3;
 
-/// What was carried out so far, step by step.
+/// What was carried out so far.
 pub(super) struct Done {
+    /// Those that were carried out.
     pub steps: Vec<Step>,
+    /// Per step the names of the things it acted on.
     pub bindings: Vec<Vec<String>>,
+    /// Per step and argument the thing that words chose.
     pub chosen: Vec<Vec<Option<String>>>,
 }
 
@@ -25,7 +28,7 @@ impl Done {
     }
 }
 
-impl<D: Domain> Ground<'_, D> {
+impl<D: Words> Ground<'_, D> {
     /// Carries the steps out on the copy of the scene.
     ///
     /// - `after_lesson`: whether a clause before this one was read as a lesson.
@@ -53,7 +56,7 @@ impl<D: Domain> Ground<'_, D> {
         if let Some(contradiction) = contradicted(scene, 0) {
             return Err(contradiction);
         }
-        // A lesson is for what comes of it: what holds already need not be done again.
+        // A lesson is taught for its effect, so steps whose effect holds already are skipped.
         let by_effect = self.context.execution.effects && !offer.seed;
         let mut held_already = None;
         if let (true, Some(reason)) = (by_effect, self.is_done(scene, program, chosen)) {
@@ -70,7 +73,7 @@ impl<D: Domain> Ground<'_, D> {
                 return Err(refused("the program is too long".to_owned(), false));
             }
             domain.signature().check(step).map_err(|reason| refused(reason, false))?;
-            // What a lesson turns on and off again may be on when it begins.
+            // A thing that a lesson turns on and off again may be on at its beginning.
             if by_effect && self.starts_on(scene, program, index) {
                 held_already = Some(refused("it is on already".to_owned(), false));
                 continue;
@@ -83,7 +86,7 @@ impl<D: Domain> Ground<'_, D> {
                     Ok(bound) => break Some(bound),
                     Err(refusal) => refusal,
                 };
-                // "Wash the apple and pick it up": the lesson did.
+                // "Wash the apple and pick it up": the lesson has already picked it up.
                 if after_lesson && self.context.execution.effects && refusal.done {
                     break None;
                 }
@@ -91,10 +94,10 @@ impl<D: Domain> Ground<'_, D> {
                     held_already = Some(refused(refusal.reason, false));
                     break None;
                 }
-                // What is in the fridge across the room takes two: going there and opening it.
+                // A thing in a fridge across the room needs two steps: going there and opening it.
                 let roles = &domain.lexicon(self.context.edition).roles;
                 let means = roles.goes(&step.operator) || roles.is_door(&step.operator);
-                // How the lesson got there need not be how one gets there here.
+                // The way of the lesson may not be the way in this scene.
                 let accounts = self.context.execution.accounting.is_some();
                 let near = (offer.open && !(accounts && offer.seed)) || by_effect;
                 if near && program.steps.len() > 1 && means && refusal.first.is_none() {
@@ -113,7 +116,7 @@ impl<D: Domain> Ground<'_, D> {
                 }
                 done.push(first, bound, refusal.first_on);
                 unasked += 1;
-                // What was too far away to contradict the words is near now.
+                // The thing was too far away to contradict the words; it is near now.
                 if let Some(contradiction) = contradicted(scene, index) {
                     return Err(contradiction);
                 }
@@ -125,7 +128,7 @@ impl<D: Domain> Ground<'_, D> {
                 self.shut_again(scene, done, &program.steps[index + 1..], &opened, on);
             }
         }
-        // Going there is not what it was for.
+        // Going there was not its purpose.
         let roles = &domain.lexicon(self.context.edition).roles;
         let only_went = done.steps[before..].iter().all(|step| roles.goes(&step.operator))
             && !program.steps.iter().all(|step| roles.goes(&step.operator));
@@ -135,7 +138,8 @@ impl<D: Domain> Ground<'_, D> {
         }
     }
 
-    /// Shuts what a lesson had to have opened unasked, unless a later step does or needs it open.
+    /// Shuts a door that was opened as a missing step of a lesson, unless a later step shuts it or
+    /// needs it open.
     fn shut_again(
         &self,
         scene: &mut D::Scene,
@@ -176,7 +180,7 @@ impl<D: Domain> Ground<'_, D> {
             && self.moment.domain.is_on(scene, step)
     }
 
-    /// Why nothing is left to do of a lesson that only takes something somewhere: it is there.
+    /// Why a lesson that only takes something somewhere has nothing left to do: the thing is there.
     fn is_done(&self, scene: &D::Scene, program: &Program, chosen: &Chosen) -> Option<String> {
         let domain = self.moment.domain;
         let roles = &domain.lexicon(self.context.edition).roles;

@@ -11,34 +11,37 @@ use crate::language::WordLists;
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Abstraction {
-    /// Swallow the lexicon's adjectives before a name: "the red mug" lifts as "the mug" does.
+    /// Drop the lexicon's adjectives before a name: "the red mug" is lifted as "the mug".
     pub adjectives: bool,
-    /// Of two names side by side keep the last: "the desk lamp table".
+    /// Of names in a row, keep the last one: "the desk lamp table".
     pub compounds: bool,
-    /// Also try the utterance without `from the <obj>`: where a thing is, is often no argument.
+    /// Also try the utterance without `from the <obj>`, because the place of a thing is often not
+    /// an argument.
     pub locations: bool,
     /// Keep the word of a typed fixture beside its slot: `<obj=sink>`.
     pub fixtures: bool,
-    /// Read a word of five letters or more that is in no table as the name one slip away from it.
+    /// Read a word of five letters or more that is in no table as the name that differs from it by
+    /// one letter.
     pub spelling: bool,
+    /// Where an utterance is cut.
     pub split: Split,
     /// Words by what they do in a clause. With them a name that is a verb too ("microwave") is read
     /// as a verb where an object follows, and "a slice of the apple" as the apple.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lists: Option<WordLists>,
-    /// What people put around a request, taken away before anything is read.
+    /// Phrases around a request, which are removed before anything is read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<Frames>,
-    /// Words by which a question, a statement or a prohibition is known; none is carried out.
+    /// The words that mark a question, a statement or a prohibition. These are never carried out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moods: Option<Moods>,
     /// Other words for what the seeds say.
     #[serde(default, skip_serializing_if = "Verbs::is_empty")]
     pub verbs: Verbs,
-    /// Read a letter and its accent as one, however they were typed (Unicode NFC).
+    /// Compose letters and accents before reading (Unicode NFC).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub composed: bool,
-    /// A number behind a name says which: "mug 2".
+    /// A number after a name says which thing: "mug 2".
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub numbers: bool,
 }
@@ -63,24 +66,24 @@ pub enum Split {
 pub struct Execution {
     /// "turn off" what is off is impossible, with that reason.
     pub polarity: bool,
-    /// When a step fails only for want of another that the world itself names (going there
-    /// first), do that one before it.
+    /// When a step fails because one other step is missing, and the world names that step (going
+    /// there first), carry the other one out before it.
     pub approach: bool,
-    /// Decline several primitives in one utterance that only make sense as a means to something
-    /// that nobody named: put something somewhere and then turn something on.
+    /// Decline several primitives in one utterance that only make sense for a purpose that was not
+    /// named: put something somewhere, then turn something on.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub purposes: bool,
-    /// Every word of a reading is accounted for, or nothing is done.
+    /// Do nothing unless the reading has a use for every word.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accounting: Option<Accounting>,
-    /// Taking something somewhere is never a walk without it.
+    /// Verbs of carrying take the thing along, and do not only walk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carrying: Option<Carrying>,
-    /// Another kind of thing that shares the name is never taken for one that is here and cannot be
-    /// used.
+    /// When the thing of the likeliest kind is here but cannot be used, do not take another kind
+    /// with the same name.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kinds: bool,
-    /// Steps of a lesson whose effect holds already are passed over.
+    /// Skip steps of a lesson whose effect holds already.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub effects: bool,
     /// Words choose between things of one kind.
@@ -88,33 +91,35 @@ pub struct Execution {
     pub instances: bool,
 }
 
-/// What may be passed over when words are accounted for. Data of a recipe.
+/// Words with a fixed part in the accounting of words. Data of a recipe.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accounting {
-    /// Nouns that name no thing of their own: "the DOOR of the fridge", "the other SIDE".
+    /// Nouns that need no use, because they name no thing of their own: "the DOOR of the fridge",
+    /// "the other SIDE".
     pub harmless: BTreeSet<String>,
-    /// The same where something is put or is, and not where the thing itself stands: "on the LID of
-    /// the toilet", "on the top SHELF" of a fridge that was just opened.
+    /// Such nouns that need no use in a phrase of place only: "on the LID of the toilet", "on the
+    /// top SHELF" of a fridge that was just opened.
     pub parts: BTreeSet<String>,
-    /// Words that ask more of a thing than to be switched: "turn the lamp UP", "RED".
+    /// Words that ask for more than switching: "turn the lamp UP", "RED".
     pub degrees: BTreeSet<String>,
-    /// Verbs of looking, which ask for more than going there where a light is named: "LOOK at the
-    /// book in the light".
+    /// Verbs of looking. With a light they ask for more than going there: "LOOK at the book in the
+    /// light".
     pub looking: BTreeSet<String>,
-    /// What stands before the light then: "BY the lamp".
+    /// Words before that light: "BY the lamp".
     pub lighting: BTreeSet<String>,
-    /// Words of what is to come of a thing, set by set: a lesson whose words say one ("a warm mug") is
-    /// not for a request that says another ("a cold bowl").
+    /// Words for the state that a thing is to have, in sets that exclude each other. A lesson with
+    /// a word of one set ("a warm mug") does not answer a request with a word of another ("a cold
+    /// bowl").
     pub states: Vec<BTreeSet<String>>,
 }
 
-/// Verbs that take a thing along.
+/// Verbs that carry a thing.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Carrying {
-    /// They leave it there: "bring".
+    /// Verbs that leave it at the place: "bring".
     pub leaving: BTreeSet<String>,
-    /// They may end with it in the hand: "carry".
+    /// Verbs that may end with it in the hand: "carry".
     pub keeping: BTreeSet<String>,
 }

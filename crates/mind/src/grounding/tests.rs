@@ -1,7 +1,7 @@
 use super::bench::{Bench, Overlap, Scene, exemplars, say};
 use super::*;
 use crate::language::{Answer, Outcome, Symbol};
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Words};
 
 /// As in the recipe `paper`.
 fn plain() -> (Abstraction, Execution) {

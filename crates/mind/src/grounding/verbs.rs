@@ -1,5 +1,5 @@
-//! Other words for what the seeds say, and slips in them. They are read before anything is lifted, so
-//! that a lesson and a later request meet in the same words.
+//! Other words for what the seeds say, and typing errors in them. They are replaced before anything
+//! is lifted, so that a lesson and a later request have the same words.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,22 @@ use serde::{Deserialize, Serialize};
 use super::names::one_slip_apart;
 use crate::language::{WordLists, is_mark};
 
-/// Other words for what seeds say ("grasp" for "pick up"), where a clause begins. A phrase with an
-/// ellipsis has its second part where the clause ends: "shut … off".
+/// Other words for what seeds say ("grasp" for "pick up"), at the beginning of a clause. A phrase
+/// with an ellipsis has its second part at the end of the clause: "shut … off".
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Verbs(BTreeMap<String, String>);
 
-/// Words in which a slip of one letter is forgiven where a clause begins.
+/// Words in which one wrong letter is corrected at the beginning of a clause.
 const SLIP_LETTERS_MIN: usize = 4;
 
 impl Verbs {
+    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// - `known`: whether a word is in ordinary use, and so no slip.
+    /// - `known`: whether a word is in ordinary use, and so not an error.
     pub(super) fn rewrite(
         &self,
         tokens: Vec<String>,
@@ -60,7 +61,7 @@ impl Verbs {
     }
 }
 
-/// The clause with `meant` in the place of `said`, and how many words that took.
+/// The clause with `meant` in the place of `said`, and how many words were replaced.
 fn replaced(clause: &[String], said: &str, meant: &str) -> Option<(usize, Vec<String>)> {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let (head, tail) = said.split_once('…').unwrap_or((said, ""));
@@ -78,7 +79,8 @@ fn replaced(clause: &[String], said: &str, meant: &str) -> Option<(usize, Vec<St
     Some((head.len() + tail.len(), out))
 }
 
-/// "Opne the fridge": a first word that is in no table, one slip from exactly one common verb.
+/// "Opne the fridge": a first word that is in no table and differs by one letter from exactly one
+/// common verb.
 fn mend_verb(
     mut clause: Vec<String>,
     lists: &WordLists,

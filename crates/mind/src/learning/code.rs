@@ -2,14 +2,13 @@ use super::bundle::Bundle;
 use crate::ids::Digest;
 use crate::numerics::NumericsVersion;
 
-/// What this code is known to make of known histories, one line each: `mind` or `state`, two names,
-/// a digest. Tests hold the code to it.
+/// What this code makes of known histories, one line each: `mind` or `state`, two names, a digest.
+/// Tests compare the code with it.
 const PINS: &str = include_str!("../../data/pins.txt");
 
-/// Names the behaviour of this code where bits matter: BLAKE3 over the version of the arithmetic,
-/// the form of minds, and the pinned digests of known minds and states. A change that moves a bit
-/// of any of them fails a test until its pin is changed, and that changes this digest; so nobody
-/// has to remember to.
+/// Names the behaviour of this code: BLAKE3 over the version of the arithmetic, the form of minds,
+/// and the pinned digests of known minds and states. A change of one bit in any of them fails a
+/// test until its pin is changed, and a changed pin changes this digest.
 pub fn code_digest() -> Digest {
     let (arithmetic, minds) = (NumericsVersion::CURRENT.0, Bundle::VERSION);
     Digest::of(

@@ -6,14 +6,14 @@ use crate::ids::Digest;
 use crate::language::{Clause, Exemplar, Program, Symbol, Word};
 use crate::numerics::Rng;
 use crate::parser::SemanticParser;
-use crate::world::{Domain, Edition};
+use crate::world::{Edition, Features, Words, World};
 
-/// The history that the reranker learns from: each lesson parsed again by the new parser at its
-/// own moment, and each seed with things of a lesson's scene in its slots, so that a few lessons do
-/// not make it forget the primitives.
+/// The history that the reranker learns from. Each lesson is parsed again by the new parser at its
+/// own moment. Each seed is added, with things of a lesson's scene in its slots, so that a few
+/// lessons do not make the reranker forget the primitives.
 ///
 /// - `mind`: the mind so far, without a reranker.
-pub(super) fn history<D: Domain>(
+pub(super) fn history<D: Words + Features>(
     domain: &D,
     mind: &Mind,
     lessons: &[Lesson<D::Scene, D::Task>],
@@ -22,7 +22,7 @@ pub(super) fn history<D: Domain>(
     let taught = lessons.iter().map(|lesson| taught(domain, mind, lesson));
     let mut rng = Rng::from_digest(seed);
     let names = names(domain, mind.recipe.settings().words.edition);
-    // Everybody's lessons come in their order, so the i-th seed always meets the same scene.
+    // Lessons keep their order, so the i-th seed always gets the same scene.
     let seeded = domain.seeds().exemplars.iter().enumerate().filter_map(|(index, exemplar)| {
         let lesson = &lessons[index % lessons.len()];
         seeded(domain, mind, lesson, exemplar, &names, &mut rng)
@@ -30,7 +30,11 @@ pub(super) fn history<D: Domain>(
     taught.chain(seeded).collect()
 }
 
-fn taught<D: Domain>(domain: &D, mind: &Mind, lesson: &Lesson<D::Scene, D::Task>) -> Choice {
+fn taught<D: Words + Features>(
+    domain: &D,
+    mind: &Mind,
+    lesson: &Lesson<D::Scene, D::Task>,
+) -> Choice {
     let moment = moment(domain, lesson);
     let known = |word: &str| mind.recipe.words().lookup(word).is_some();
     let candidates = mind.interpreter(&known).candidates(&moment, &lesson.utterance);
@@ -38,9 +42,9 @@ fn taught<D: Domain>(domain: &D, mind: &Mind, lesson: &Lesson<D::Scene, D::Task>
     choice(lesson.utterance.tokens(), &moment, programs, &lesson.program)
 }
 
-/// A seed said at the lesson's moment, about things that stand there. Whether it would run is not
-/// asked: the words alone tell a pick-up from an opening.
-fn seeded<D: Domain>(
+/// A seed at the moment of a lesson, about things of that scene. Whether it would run does not
+/// matter: the words alone tell PICKUP from OPEN.
+fn seeded<D: Words + Features>(
     domain: &D,
     mind: &Mind,
     lesson: &Lesson<D::Scene, D::Task>,
@@ -49,10 +53,7 @@ fn seeded<D: Domain>(
     rng: &mut Rng,
 ) -> Option<Choice> {
     let moment = moment(domain, lesson);
-    let mut kinds: Vec<Symbol> =
-        domain.look(&lesson.scene).things.into_iter().map(|thing| thing.kind).collect();
-    kinds.sort();
-    kinds.dedup();
+    let mut kinds: Vec<Symbol> = domain.present(&lesson.scene).into_iter().collect();
     kinds.retain(|kind| names.contains_key(kind));
     if kinds.is_empty() {
         return None;
@@ -78,7 +79,7 @@ fn seeded<D: Domain>(
     Some(choice(words, &moment, programs, &right))
 }
 
-fn choice<D: Domain>(
+fn choice<D: Features>(
     words: Vec<String>,
     moment: &Moment<'_, D>,
     mut programs: Vec<Program>,
@@ -93,7 +94,7 @@ fn choice<D: Domain>(
     Choice { words, candidates, right: place }
 }
 
-fn moment<'a, D: Domain>(domain: &'a D, lesson: &'a Lesson<D::Scene, D::Task>) -> Moment<'a, D> {
+fn moment<'a, D: World>(domain: &'a D, lesson: &'a Lesson<D::Scene, D::Task>) -> Moment<'a, D> {
     Moment {
         domain,
         scene: &lesson.scene,
@@ -104,7 +105,7 @@ fn moment<'a, D: Domain>(domain: &'a D, lesson: &'a Lesson<D::Scene, D::Task>) -
 }
 
 /// The commonest name of each type.
-fn names<D: Domain>(domain: &D, edition: Edition) -> BTreeMap<Symbol, String> {
+fn names<D: Words>(domain: &D, edition: Edition) -> BTreeMap<Symbol, String> {
     let mut best: BTreeMap<Symbol, (u32, String)> = BTreeMap::new();
     for (name, meanings) in &domain.lexicon(edition).names {
         for meaning in meanings {

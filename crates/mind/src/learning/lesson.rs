@@ -4,11 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::language::{Program, Symbol, Utterance};
 
-/// One taught decomposition, with what its lifting depends on. `S` is the domain's scene.
+/// One taught decomposition, with everything that its lifting depends on. `S` is a world's scene,
+/// `T` its task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lesson<S, T> {
+    /// What was said.
     pub utterance: Utterance,
-    /// Ground: object types, no slots.
+    /// What it means: object types, no slots.
     pub program: Program,
     /// The scene at the utterance.
     pub scene: Arc<S>,

@@ -3,7 +3,7 @@ use crate::grounding::{Abstractor, resolve, without_locations};
 use crate::language::{
     Clause, Exemplar, LiftedArg, LiftedProgram, LiftedStep, Program, Roles, Symbol,
 };
-use crate::world::Domain;
+use crate::world::Words;
 
 /// What a lesson becomes for the parser: its utterance and its program, both lifted (paper,
 /// section 3.2).
@@ -12,18 +12,15 @@ use crate::world::Domain;
 /// types, it meant the one that the program acts on. All other arguments stay what they were:
 /// "wash the mug" keeps its `SinkBasin`. With [`super::recipe::Lifting::held`], what was in the
 /// hand when the utterance was said and was not mentioned becomes `<held>`.
-pub fn lift<D: Domain>(
-    domain: &D,
-    recipe: &Recipe,
-    lesson: &Lesson<D::Scene, D::Task>,
-) -> Exemplar {
+pub fn lift<D: Words>(domain: &D, recipe: &Recipe, lesson: &Lesson<D::Scene, D::Task>) -> Exemplar {
     let settings = recipe.settings();
     let known = |word: &str| recipe.words().lookup(word).is_some();
     let abstractor =
         Abstractor::new(domain.lexicon(settings.words.edition), &settings.abstraction, &known);
     let whole = abstractor.read(&lesson.utterance).whole();
     let lifted = lift_clause(domain, recipe, lesson, &whole);
-    // "from the <obj>" goes only when the program does not need it: then the place was no argument.
+    // "from the <obj>" is dropped only if the program does not need it. Then it was not an
+    // argument.
     let shorter = settings.abstraction.locations.then(|| without_locations(&whole)).flatten();
     let shorter = shorter.map(|clause| (lift_clause(domain, recipe, lesson, &clause), clause));
     match shorter {
@@ -34,7 +31,7 @@ pub fn lift<D: Domain>(
     }
 }
 
-fn lift_clause<D: Domain>(
+fn lift_clause<D: Words>(
     domain: &D,
     recipe: &Recipe,
     lesson: &Lesson<D::Scene, D::Task>,
@@ -52,8 +49,8 @@ fn lift_clause<D: Domain>(
         .map(|(types, said)| types.iter().chain(&said.types).find(acts_on).or(types.first()))
         .collect();
     let held = domain.held(&lesson.scene).filter(|_| recipe.settings().lifting.held);
-    // "In the sink" says how, not what: another wording need not say it. But where a task ends is
-    // said of each thing anew.
+    // "In the sink" says how, not what, so other wordings may leave it out. But a person names the
+    // place where a task ends every time.
     let lexicon = domain.lexicon(edition);
     let keeps = recipe.settings().abstraction.lists.is_some();
     let goal = goal(&lexicon.roles, &lesson.program);

@@ -4,7 +4,7 @@ use super::{Recipe, Report, TrainError};
 use crate::grounding::{Interpreter, Moment, Reranker};
 use crate::ids::Digest;
 use crate::language::{Answer, Exemplar, Utterance};
-use crate::world::Domain;
+use crate::world::{Features, Words};
 
 /// Parser, reranker and threshold, ready to use. A pure function of the recipe and the lessons.
 #[derive(Debug, Clone)]
@@ -43,6 +43,7 @@ impl Mind {
         self.recipe.digest()
     }
 
+    /// What its training measured.
     pub fn report(&self) -> &Report {
         &self.report
     }
@@ -63,9 +64,9 @@ impl Mind {
 
     /// The mind that [`Mind::to_bytes`] wrote, with the same digest.
     ///
-    /// - errors: bytes that are no mind, of another version, of another recipe or other seeds, or
-    ///   whose parts do not fit together. Never panics, whatever the bytes.
-    pub fn from_bytes<D: Domain>(
+    /// - errors: bytes that are not a mind, of another version, of another recipe or other seeds,
+    ///   or whose parts do not fit together. Never panics, whatever the bytes.
+    pub fn from_bytes<D: Words + Features>(
         domain: &D,
         recipe: &Recipe,
         bytes: &[u8],
@@ -101,18 +102,21 @@ impl Mind {
     }
 
     /// What the utterance asks for at this moment; see [`Interpreter::interpret`].
-    pub fn interpret<D: Domain>(&self, moment: Moment<'_, D>, utterance: &Utterance) -> Answer {
+    pub fn interpret<D: Words + Features>(
+        &self,
+        moment: Moment<'_, D>,
+        utterance: &Utterance,
+    ) -> Answer {
         let known = |word: &str| self.recipe.words().lookup(word).is_some();
         self.interpreter(&known).interpret(&moment, utterance)
     }
 
-    /// As [`Mind::interpret`], with another threshold in the place of the mind's own: its weights,
-    /// exemplars and reranker stay as they are. For questions about the past; nobody is ever
-    /// answered with it.
+    /// [`Mind::interpret`] with another threshold than the mind's own. Weights, exemplars and
+    /// reranker stay as they are. For questions about the past; no user is answered with it.
     ///
     /// - `threshold`: in the unit of the parser's distances.
     /// - returns: none when the parser has no threshold.
-    pub fn interpret_within<D: Domain>(
+    pub fn interpret_within<D: Words + Features>(
         &self,
         moment: Moment<'_, D>,
         utterance: &Utterance,
@@ -147,7 +151,7 @@ impl Mind {
         }
     }
 
-    /// Seeds first, then lessons in order; the lesson's index is 0-based.
+    /// The exemplars: seeds first, then lessons in order, each with its 0-based number.
     pub fn exemplars(&self) -> Vec<(Exemplar, Option<usize>)> {
         let numbered = self.parser.exemplars().iter().enumerate();
         numbered.map(|(number, exemplar)| (exemplar.clone(), self.lesson_of(number))).collect()

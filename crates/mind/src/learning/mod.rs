@@ -8,15 +8,17 @@ mod lesson;
 mod lift;
 mod mind;
 mod parsing;
+/// Recipes: the settings of minds, and their files.
 pub mod recipe;
 #[cfg(test)]
 mod tests;
 mod train;
 
+pub use crate::language::Report;
 pub use code::{code_digest, mind_schema, pinned};
 pub use error::TrainError;
 pub use lesson::Lesson;
 pub use lift::lift;
 pub use mind::Mind;
-pub use recipe::{Recipe, RecipeError, Report};
+pub use recipe::{Recipe, RecipeError};
 pub use train::train;

@@ -10,32 +10,42 @@ use crate::parser::{
     GrammarWeights, Parse, SemanticParser, Seq2SeqParser, Seq2SeqSettings, Seq2SeqWeights,
     TrainFault,
 };
-use crate::world::Domain;
+use crate::world::Words;
 
 /// The parser of a mind, of the kind that its recipe names.
 #[derive(Debug, Clone)]
-pub enum AnyParser {
+pub(super) enum AnyParser {
+    /// The paper's.
     Exemplar(Box<ExemplarParser>),
+    /// Of recipe `default`.
     Features(Box<FeaturesParser>),
+    /// A grammar alone.
     Grammar(Box<GrammarParser>),
+    /// A sequence-to-sequence model alone.
     Seq2seq(Box<Seq2SeqParser>),
+    /// The paper's baseline.
     Backed(Box<BackedParser>),
 }
 
-/// What a parser of some kind learned, for storing.
+/// What a parser learned, as it is stored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum ParserWeights {
+pub(super) enum ParserWeights {
+    /// Of the paper's parser.
     Exemplar(ExemplarWeights),
+    /// Of the parser of recipe `default`.
     Features(FeaturesWeights),
+    /// Of a grammar, which learns nothing.
     Grammar(GrammarWeights),
-    /// Of both kinds that have a network; a grammar learns nothing.
+    /// Of both kinds that have a network.
     Seq2seq(Seq2SeqWeights),
 }
 
 impl AnyParser {
-    /// - `exemplars`: the domain's seeds, then the lessons.
-    pub fn train<D: Domain>(
+    /// Trains the parser that the recipe names.
+    ///
+    /// - `exemplars`: the world's seeds, then the lessons.
+    pub(super) fn train<D: Words>(
         recipe: &Recipe,
         domain: &D,
         seed: Digest,
@@ -68,8 +78,10 @@ impl AnyParser {
         trained.map_err(TrainError::failed)
     }
 
+    /// The parser that `weights` came from, given the same recipe, world and exemplars.
+    ///
     /// - errors: weights of another kind than the recipe's, or that do not fit.
-    pub fn restore<D: Domain>(
+    pub(super) fn restore<D: Words>(
         recipe: &Recipe,
         domain: &D,
         exemplars: &[Exemplar],
@@ -108,7 +120,8 @@ impl AnyParser {
         restored.map_err(TrainError::unreadable)
     }
 
-    pub fn weights(&self) -> ParserWeights {
+    /// What it learned.
+    pub(super) fn weights(&self) -> ParserWeights {
         match self {
             AnyParser::Exemplar(parser) => ParserWeights::Exemplar(parser.weights().clone()),
             AnyParser::Features(parser) => ParserWeights::Features(parser.weights().clone()),
@@ -118,13 +131,13 @@ impl AnyParser {
         }
     }
 
-    /// Whether more than one answer is ever offered for the same words, so that a reranker has
-    /// something to choose from.
-    pub fn offers_choices(&self) -> bool {
+    /// Whether it can offer several answers for the same words, so that a reranker has a choice.
+    pub(super) fn offers_choices(&self) -> bool {
         matches!(self, AnyParser::Exemplar(_) | AnyParser::Features(_))
     }
 
-    pub fn exemplars(&self) -> &[Exemplar] {
+    /// Seeds first, then lessons in order.
+    pub(super) fn exemplars(&self) -> &[Exemplar] {
         match self {
             AnyParser::Exemplar(parser) => parser.exemplars(),
             AnyParser::Features(parser) => parser.exemplars(),
@@ -134,7 +147,8 @@ impl AnyParser {
         }
     }
 
-    pub fn threshold(&self) -> f32 {
+    /// The largest distance that counts as understood; 0 for a grammar. No unit.
+    pub(super) fn threshold(&self) -> f32 {
         match self {
             AnyParser::Exemplar(parser) => parser.threshold(),
             AnyParser::Features(parser) => parser.threshold(),
@@ -144,17 +158,17 @@ impl AnyParser {
     }
 }
 
-/// A parser that holds its distances against another threshold than its own.
+/// A parser with another threshold than its own.
 #[derive(Debug, Clone, Copy)]
-pub struct Within<'a> {
+pub(super) struct Within<'a> {
     parser: &'a AnyParser,
     threshold: f32,
 }
 
 impl AnyParser {
-    /// None for parsers that have no threshold: a grammar and a sequence-to-sequence model answer
-    /// or do not, however far.
-    pub fn within(&self, threshold: f32) -> Option<Within<'_>> {
+    /// The parser with this threshold. None for parsers without one: a grammar and a
+    /// sequence-to-sequence model do not compare distances.
+    pub(super) fn within(&self, threshold: f32) -> Option<Within<'_>> {
         let has_one = matches!(self, AnyParser::Exemplar(_) | AnyParser::Features(_));
         has_one.then_some(Within { parser: self, threshold })
     }
@@ -238,7 +252,7 @@ fn exemplar(recipe: &Recipe) -> Result<&ExemplarSettings, TrainError> {
     settings.ok_or_else(|| TrainError::failed("the recipe has no section [parser.exemplar]"))
 }
 
-fn features<'a, D: Domain>(
+fn features<'a, D: Words>(
     recipe: &'a Recipe,
     domain: &'a D,
 ) -> Result<(&'a FeaturesSettings, Background<'a>), TrainError> {

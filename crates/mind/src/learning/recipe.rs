@@ -1,4 +1,3 @@
-use std::collections::BTreeMap;
 use std::sync::{LazyLock, OnceLock};
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +11,7 @@ use crate::parser::{
 };
 use crate::world::Edition;
 
-/// Settings only, with a digest: everything that decides what a mind becomes, beside the lessons.
+/// Everything that decides what a mind becomes, except the lessons: settings, with a digest.
 #[derive(Debug, Clone)]
 pub struct Recipe {
     name: String,
@@ -25,21 +24,27 @@ pub struct Recipe {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeSettings {
+    /// Word vectors, and names of things.
     pub words: WordSettings,
+    /// How utterances are lifted.
     pub abstraction: Abstraction,
+    /// How lessons become exemplars.
     pub lifting: Lifting,
+    /// How programs are run.
     pub execution: Execution,
+    /// Which parser, and its settings.
     pub parser: ParserSettings,
+    /// How the reranker is trained.
     pub reranker: RerankerSettings,
 }
 
-/// Which words it knows: the vectors, and what things are called.
+/// Which words a mind knows: their vectors, and what things are called.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WordSettings {
-    /// The name of a table that ships.
+    /// The name of a built-in table.
     pub table: String,
-    /// Which edition of the domain's names and words.
+    /// Which edition of the world's names and words.
     #[serde(default, skip_serializing_if = "Edition::is_first")]
     pub edition: Edition,
 }
@@ -48,8 +53,8 @@ pub struct WordSettings {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lifting {
-    /// What was in the hand and not mentioned becomes `<held>` in the lifted program; otherwise
-    /// it stays the object that it was, as in the paper.
+    /// Whether a thing in the hand that was not mentioned becomes `<held>` in the lifted program.
+    /// If not, it stays the type that it was, as in the paper.
     pub held: bool,
 }
 
@@ -57,26 +62,31 @@ pub struct Lifting {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParserSettings {
+    /// Which one.
     pub kind: ParserKind,
+    /// For [`ParserKind::Exemplar`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exemplar: Option<ExemplarSettings>,
+    /// For [`ParserKind::Features`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub features: Option<FeaturesSettings>,
+    /// For [`ParserKind::Grammar`] and [`ParserKind::Backed`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grammar: Option<GrammarSettings>,
+    /// For [`ParserKind::Seq2seq`] and [`ParserKind::Backed`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seq2seq: Option<Seq2SeqSettings>,
 }
 
-/// The parsers there are.
+/// The kinds of parsers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParserKind {
     /// The paper's: an embedding network and the nearest exemplars.
     Exemplar,
-    /// Judges with features and weights learned once; nothing trained per person but thresholds.
+    /// Judges with features and weights learned once. Only thresholds are trained per person.
     Features,
-    /// A grammar that somebody wrote: exact where it answers, and nothing is learned.
+    /// A hand-written grammar: exact where it answers. It learns nothing.
     Grammar,
     /// A sequence-to-sequence model with attention and copying, trained on seeds and lessons.
     Seq2seq,
@@ -85,7 +95,7 @@ pub enum ParserKind {
     Backed,
 }
 
-/// A recipe file as it stands: its name is no setting and not part of the digest.
+/// A recipe file. Its name is not a setting and not part of the digest.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RecipeFile {
@@ -102,8 +112,11 @@ struct RecipeFile {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the recipe has an error at line {line}, column {column}: {reason}")]
 pub struct RecipeError {
+    /// From 1.
     pub line: usize,
+    /// From 1, in characters.
     pub column: usize,
+    /// What is wrong, and what was expected.
     pub reason: String,
 }
 
@@ -118,14 +131,14 @@ const SEQ2SEQ: &str = include_str!("../../data/recipes/seq2seq.toml");
 const SEQ2SEQ_GRAMMAR: &str = include_str!("../../data/recipes/seq2seq-grammar.toml");
 
 impl Recipe {
-    /// The names of the recipes that ship for people; `tiny` is for tests.
+    /// The names of the built-in recipes for people; `tiny` is for tests.
     pub const BUILTIN: [&'static str; 6] =
         ["default-1", "default-2", "paper", "grammar", "seq2seq", "seq2seq-grammar"];
-    /// What the name `default` stands for today. It is resolved where a person or a study begins, and
-    /// what is recorded has the permanent name.
+    /// The recipe that the name `default` means today. A new person or study gets it under its own
+    /// name, and only that name is recorded.
     pub const DEFAULT: &'static str = "default-2";
 
-    /// The TOML text of a recipe that ships.
+    /// The TOML text of a built-in recipe; none for another name.
     pub fn builtin(name: &str) -> Option<&'static str> {
         match name {
             "default" => Recipe::builtin(Recipe::DEFAULT),
@@ -140,14 +153,16 @@ impl Recipe {
         }
     }
 
-    /// - errors: [`RecipeError`], for text that is no TOML, an unknown or missing field, a value
+    /// Reads a recipe.
+    ///
+    /// - errors: [`RecipeError`], for text that is not TOML, an unknown or missing field, a value
     ///   out of range, or an unknown word table.
     pub fn parse(toml: &str) -> Result<Recipe, RecipeError> {
-        // Nearly everybody's records carry a recipe that ships, and all of them are read at waking.
+        // Most records carry a built-in recipe, and every session reads its own when it wakes.
         const TEXTS: [&str; 7] =
             [DEFAULT_1, DEFAULT_2, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
         static SHIPPED: [OnceLock<Recipe>; TEXTS.len()] = [const { OnceLock::new() }; TEXTS.len()];
-        // What `default-1` was called when it was the only one.
+        // Release 0.1 wrote `default-1` with the name `default`.
         static FORMER: LazyLock<String> =
             LazyLock::new(|| DEFAULT_1.replacen("\"default-1\"", "\"default\"", 1));
         static FORMER_READ: OnceLock<Recipe> = OnceLock::new();
@@ -155,20 +170,20 @@ impl Recipe {
             if let Some(recipe) = FORMER_READ.get() {
                 return Ok(recipe.clone());
             }
-            let recipe = Recipe::parse_anew(toml)?;
+            let recipe = Recipe::read(toml)?;
             return Ok(FORMER_READ.get_or_init(|| recipe).clone());
         }
         let Some(index) = TEXTS.iter().position(|text| *text == toml) else {
-            return Recipe::parse_anew(toml);
+            return Recipe::read(toml);
         };
         if let Some(recipe) = SHIPPED[index].get() {
             return Ok(recipe.clone());
         }
-        let recipe = Recipe::parse_anew(toml)?;
+        let recipe = Recipe::read(toml)?;
         Ok(SHIPPED[index].get_or_init(|| recipe).clone())
     }
 
-    fn parse_anew(toml: &str) -> Result<Recipe, RecipeError> {
+    fn read(toml: &str) -> Result<Recipe, RecipeError> {
         let file: RecipeFile = toml::from_str(toml).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start);
             at(toml, start, error.message().trim().replace('\n', "; "))
@@ -189,9 +204,9 @@ impl Recipe {
         Ok(Recipe { name, settings, words, digest })
     }
 
-    /// The same settings under another digest, and so with another training seed. For
-    /// evaluations, which have to tell a method's strength from one training's luck; no person's
-    /// mind is ever trained with it.
+    /// The same settings under another digest, and so with another training seed. For evaluations,
+    /// which must separate the quality of a method from the luck of one training. No person's mind
+    /// is trained with it.
     pub fn reseeded(&self, seed: u64) -> Recipe {
         let mut hasher = blake3::Hasher::new_derive_key("apprentice 2026 evaluation seed");
         hasher.update(&self.digest.0);
@@ -199,14 +214,17 @@ impl Recipe {
         Recipe { digest: Digest(*hasher.finalize().as_bytes()), ..self.clone() }
     }
 
+    /// As its file names it.
     pub fn name(&self) -> &str {
         &self.name
     }
 
+    /// The sections of its file.
     pub fn settings(&self) -> &RecipeSettings {
         &self.settings
     }
 
+    /// The word table that its settings name.
     pub fn words(&self) -> &'static WordTable {
         self.words
     }
@@ -305,8 +323,8 @@ fn at(toml: &str, start: usize, reason: String) -> RecipeError {
     RecipeError { line, column, reason }
 }
 
-/// Where a section's field stands in the text; the section's head when the field is not written
-/// out, the beginning when neither is.
+/// Where a field of a section is in the text, in bytes from 0; the head of the section when the
+/// field is not written, 0 when the section is not.
 fn locate(toml: &str, section: &str, field: &str) -> usize {
     let head = format!("[{section}]");
     let mut inside = section.is_empty();
@@ -330,18 +348,10 @@ fn locate(toml: &str, section: &str, field: &str) -> usize {
     found
 }
 
-/// What a training measured about itself.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Report {
-    /// Seeds and lessons.
-    pub exemplars: u32,
-    pub threshold: f32,
-    pub figures: BTreeMap<String, f64>,
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
 
     #[test]

@@ -5,7 +5,7 @@ use crate::grounding::Moment;
 use crate::grounding::bench::{Bench, Scene, say};
 use crate::language::{Answer, Outcome, Symbol};
 use crate::numerics::Rng;
-use crate::world::Domain;
+use crate::world::Words;
 
 type BenchLesson = Lesson<Scene, ()>;
 

@@ -7,18 +7,19 @@ use crate::ids::Digest;
 use crate::language::{Clause, Exemplar, Symbol};
 use crate::limits::LESSONS_MAX;
 use crate::parser::SemanticParser;
-use crate::world::Domain;
+use crate::world::{Features, Words};
 
-/// Trains a mind: seeds and lifted lessons to exemplars, the parser on them, its threshold; then
-/// the whole history is parsed again and the reranker learns from it (paper, section 3.3).
+/// Trains a mind. Seeds and lifted lessons become exemplars. The parser is trained on these, with
+/// its threshold. Then the whole history is parsed again, and the reranker learns from it (paper,
+/// section 3.3).
 ///
-/// A pure function: the training seed derives from the recipe's digest alone, so the same recipe
-/// and lessons give the same mind, bit for bit, on every machine. Without lessons it is the base
-/// mind, which everybody starts with.
+/// A pure function: the training seed comes from the recipe's digest alone, so the same recipe and
+/// lessons give the same mind, bit for bit, on every machine. Without lessons it is the base mind,
+/// with which every person starts.
 ///
 /// - errors: too many lessons, a training that diverges, or a seed that no longer gets its own
 ///   program. The previous mind is then the one to keep.
-pub fn train<D: Domain>(
+pub fn train<D: Words + Features>(
     domain: &D,
     recipe: &Recipe,
     lessons: &[Lesson<D::Scene, D::Task>],
@@ -82,7 +83,7 @@ fn clashes(exemplars: &[Exemplar]) -> bool {
 }
 
 /// Everything that programs may consist of.
-fn symbols<D: Domain>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Vec<Symbol> {
+fn symbols<D: Words>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Vec<Symbol> {
     let operators = domain.signature().operators.iter().map(|operator| operator.name.clone());
     let meanings = domain.lexicon(recipe.settings().words.edition).names.values().flatten();
     let kinds = meanings.map(|meaning| meaning.kind.clone());
@@ -94,7 +95,9 @@ fn symbols<D: Domain>(domain: &D, recipe: &Recipe, exemplars: &[Exemplar]) -> Ve
     operators.chain(kinds).chain(constants).collect()
 }
 
-/// What everybody can say from the first day must not be lost to a lesson.
+/// Checks that every seed still means its program: no lesson may take it away.
+///
+/// - errors: [`TrainError::SeedUnheard`], [`TrainError::SeedLost`].
 fn seeds_keep_their_programs<S, T>(
     parser: &AnyParser,
     seeds: &[Exemplar],

@@ -1,11 +1,13 @@
 use super::{GrammarParser, Parse, SemanticParser, Seq2SeqParser};
 use crate::language::Clause;
 
-/// The paper's baseline: the grammar answers first, and where it has nothing the sequence-to-sequence
-/// model answers. Each candidate says which of the two gave it.
+/// The paper's baseline: the grammar answers first, and where it has nothing the
+/// sequence-to-sequence model answers. Each candidate says which of the two gave it.
 #[derive(Debug, Clone)]
 pub struct BackedParser {
+    /// Asked first.
     pub grammar: GrammarParser,
+    /// Asked where the grammar has no answer.
     pub model: Seq2SeqParser,
 }
 
@@ -19,7 +21,7 @@ impl SemanticParser for BackedParser {
         Parse { threshold: Seq2SeqParser::THRESHOLD, ..parse }
     }
 
-    /// One reading is all that either gives.
+    /// Both give one reading at most.
     fn sure_of_order(&self) -> bool {
         true
     }

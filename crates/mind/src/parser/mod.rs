@@ -1,5 +1,4 @@
-//! Lifted semantic parsing: from a lifted utterance to candidate lifted programs, or an honest
-//! *not sure*.
+//! Lifted semantic parsing: from a lifted utterance to candidate lifted programs, or to *not sure*.
 
 mod backed;
 pub mod exemplar;

@@ -1,18 +1,18 @@
 use crate::language::{Answerer, Clause, LiftedProgram, Near};
 
-/// Pure. Parsers differ only behind this line.
+/// Finds programs for lifted clauses. A pure function of its weights and the clause.
 pub trait SemanticParser {
     /// Candidate programs for one clause, all within the parser's own threshold.
     fn parse(&self, clause: &Clause) -> Parse;
 
-    /// How far a chain of clauses is, from how far its first clauses and the next one are. As sure
-    /// as its weakest link, unless a parser knows better.
+    /// The distance of a chain of clauses, from that of its first clauses and that of the next one.
+    /// The larger of the two, unless the parser has a better rule.
     fn chain(&self, so_far: f32, next: f32) -> f32 {
         so_far.max(next)
     }
 
-    /// Whether the nearest candidate that runs is the one to take, and a reranker is only asked
-    /// where several are equally near.
+    /// Whether the nearest candidate that runs is the answer. A reranker then only chooses between
+    /// candidates at the same distance.
     fn sure_of_order(&self) -> bool {
         false
     }
@@ -24,23 +24,26 @@ pub struct Parse {
     /// Distinct programs within the threshold, nearest first (ties: the older exemplar). Empty
     /// means *not sure*.
     pub candidates: Vec<Scored>,
-    /// The nearest exemplars, near enough or not, for the evidence.
+    /// The nearest exemplars for the evidence, within the threshold or not.
     pub nearest: Vec<Near>,
-    /// What the distances were held against.
+    /// The largest distance that counts as understood.
     pub threshold: f32,
-    /// How many of the candidates come from exemplars with exactly this lifted form, or are so
-    /// near that no other reading counts. They come first and beat the reranker.
+    /// How many of the candidates have an exemplar of exactly this lifted form, or are so near that
+    /// no other reading counts. They come first, and the reranker does not choose between them.
     pub exact: usize,
 }
 
+/// A candidate program for a clause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scored {
+    /// What the clause would mean.
     pub program: LiftedProgram,
+    /// No unit; smaller is nearer.
     pub distance: f32,
-    /// The exemplar that gave it; [`Scored::OF_NONE`] when the parser made it up.
+    /// The number of the exemplar that it comes from; [`Scored::OF_NONE`] if it comes from none.
     pub number: u32,
-    /// Whether the slots are only kinds of arguments: which mention fills which is then for the
-    /// world to say. Otherwise slot n is the n-th mention.
+    /// Whether the world chooses which mention fills which slot. If not, slot n is the n-th
+    /// mention.
     pub open: bool,
     /// Which part of the parser gave it, where it has parts.
     pub by: Option<Answerer>,

@@ -3,7 +3,7 @@ use std::sync::OnceLock;
 use crate::ids::Digest;
 use crate::numerics::Rng;
 
-/// Word vectors: what is known about words before anybody taught anything.
+/// Word vectors: what is known about words before anybody has taught anything.
 ///
 /// Little-endian: magic `APWT`, `u32` version 1, `u32` dims, `u32` count; then `count` words in
 /// byte order, each a `u8` length and its UTF-8; then a scale per word (`f32`; entry = byte ×
@@ -23,31 +23,76 @@ pub struct WordTable {
     digest: Digest,
 }
 
-/// Why bytes are no word table.
+/// Why bytes are not a word table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WordTableError {
+    /// The bytes do not begin with the magic.
     #[error("no word table: it starts with {found:02x?}, expected the letters APWT")]
-    Magic { found: Vec<u8> },
+    Magic {
+        /// The first four bytes.
+        found: Vec<u8>,
+    },
+    /// Another version wrote them.
     #[error("word table of version {found}; this build reads version {}", WordTable::VERSION)]
-    Version { found: u32 },
+    Version {
+        /// Its number.
+        found: u32,
+    },
+    /// There are too few bytes.
     #[error("the word table ends early: {what} needs {needed} bytes, {left} are left")]
-    Short { what: &'static str, needed: usize, left: usize },
+    Short {
+        /// The part that is cut off.
+        what: &'static str,
+        /// Bytes of that part.
+        needed: usize,
+        /// Bytes that are there.
+        left: usize,
+    },
+    /// There are too many bytes.
     #[error("the word table has {extra} bytes too many")]
-    Long { extra: usize },
+    Long {
+        /// How many too many.
+        extra: usize,
+    },
+    /// A word is not UTF-8.
     #[error("word {index} of the word table is not UTF-8")]
-    Text { index: usize },
+    Text {
+        /// 0-based.
+        index: usize,
+    },
+    /// The words are not sorted, or one is there twice.
     #[error("word {index} of the word table, {word:?}, is not after its predecessor in byte order")]
-    Order { index: usize, word: String },
+    Order {
+        /// 0-based.
+        index: usize,
+        /// The word.
+        word: String,
+    },
+    /// A number of a word is not one that a table may have.
     #[error("word {word:?} of the word table has the {what} {value}")]
-    Value { word: String, what: &'static str, value: String },
+    Value {
+        /// The word.
+        word: String,
+        /// `scale` or `frequency`.
+        what: &'static str,
+        /// The number.
+        value: String,
+    },
+    /// There is nothing in the table.
     #[error("a word table of {dims} dimensions and {count} words; both must be at least 1")]
-    Empty { dims: u32, count: u32 },
+    Empty {
+        /// Numbers per vector.
+        dims: u32,
+        /// Words.
+        count: u32,
+    },
 }
 
 impl WordTable {
+    /// The version of the form that this build reads.
     pub const VERSION: u32 = 1;
 
-    /// The table that ships under this name.
+    /// The built-in table with this name.
     pub fn builtin(name: &str) -> Option<&'static WordTable> {
         static PAPER: OnceLock<WordTable> = OnceLock::new();
         static DEFAULT: OnceLock<WordTable> = OnceLock::new();
@@ -60,6 +105,9 @@ impl WordTable {
         Some(table.get_or_init(read))
     }
 
+    /// Reads a table.
+    ///
+    /// - errors: [`WordTableError`], bytes in another form.
     pub fn parse(bytes: &[u8]) -> Result<WordTable, WordTableError> {
         let mut rest = Reader { rest: bytes };
         let magic = rest.take("the magic", 4)?;
@@ -91,7 +139,7 @@ impl WordTable {
         }
         let scales = rest.floats("the scales", count)?;
         let frequencies = rest.floats("the frequencies", count)?;
-        // Saturating: a size beyond memory is a size that is not there.
+        // Saturating: the bytes never have so large a size.
         let entries = rest.take("the entries", count.saturating_mul(dims))?;
         let entries: Vec<i8> = entries.iter().map(|&byte| byte as i8).collect();
         if !rest.rest.is_empty() {
@@ -152,17 +200,20 @@ impl WordTable {
         self.dims
     }
 
-    /// Words.
+    /// How many words there are.
     pub fn count(&self) -> usize {
         self.ends.len()
     }
 
+    /// The word at a 0-based place.
+    ///
     /// - panics: `index` is not below [`WordTable::count`].
     pub fn word(&self, index: usize) -> &str {
         let start = if index == 0 { 0 } else { self.ends[index - 1] };
         &self.text[start as usize..self.ends[index] as usize]
     }
 
+    /// The 0-based place of a word; none if the table does not have it.
     pub fn lookup(&self, word: &str) -> Option<usize> {
         let (mut low, mut high) = (0, self.count());
         while low < high {
@@ -176,9 +227,13 @@ impl WordTable {
         None
     }
 
-    /// Writes the word's vector to `out`, `[dims]`. A word that the table lacks gets a vector of
-    /// its own, of typical length, made from a hash: unknown words are far from everything and
-    /// from one another, but equal to themselves. Never zero, which would make them invisible.
+    /// Writes the word's vector to `out`, `[dims]`.
+    ///
+    /// A word that is not in the table gets a vector of typical length, made from its hash: an
+    /// unknown word is far from all others, and equal to itself. It is never zero, which would make
+    /// the word invisible.
+    ///
+    /// - panics: `out` does not have `dims` numbers.
     pub fn write_vector(&self, word: &str, out: &mut [f32]) {
         assert_eq!(out.len(), self.dims, "room for one vector");
         match self.lookup(word) {

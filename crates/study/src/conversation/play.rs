@@ -9,7 +9,7 @@ use apprentice::language::{Answer, Outcome, Program, Step, Symbol, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
 use apprentice::limits::SCENE_FILE_BYTES_MAX;
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage, Thing};
+use apprentice::world::{Show, Stage, Thing, World};
 
 use super::reach::{after, carry_out, path, same_request};
 use super::{Case, Class, ConversationError, Counts, OfTranscript, Played, Written};

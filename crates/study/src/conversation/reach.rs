@@ -2,7 +2,7 @@
 
 use apprentice::language::{Program, Step};
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Infeasible};
+use apprentice::world::{Infeasible, World};
 
 use crate::score;
 use crate::transcript::Request;

@@ -6,8 +6,8 @@ use apprentice::events::{Ending, EpisodeStarted, Event, Interpreted, Record};
 use apprentice::language::{Answerer, Outcome, Program, Step, Symbol};
 use apprentice::learning::Recipe;
 use apprentice::learning::recipe::ParserKind;
-use apprentice::world::Domain;
 use apprentice::world::household::{Household, Scene, Task};
+use apprentice::world::{Words, World};
 use serde::{Deserialize, Serialize};
 
 use crate::participant::{Turn, carried_out_as_meant};

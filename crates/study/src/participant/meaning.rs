@@ -1,8 +1,8 @@
 //! What somebody meant, and whether it is what was done.
 
 use apprentice::language::{Program, Step};
-use apprentice::world::Domain;
 use apprentice::world::household::{Household, Scene, Task};
+use apprentice::world::{Show, Words, World};
 
 /// What a request comes to in the present scene.
 #[derive(Debug, Clone, PartialEq)]

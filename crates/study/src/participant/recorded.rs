@@ -3,7 +3,7 @@
 
 use apprentice::language::{Program, Step, Symbol, Utterance};
 use apprentice::world::household::{Household, Scene};
-use apprentice::world::{Domain, Stage, Thing};
+use apprentice::world::{Show, Stage, Thing};
 
 use super::parts::{Unit, primitive};
 use super::talk::{Heard, Talk, TalkError, Turn, Wire};

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use apprentice::language::{Program, Step, Symbol};
 use apprentice::numerics::Rng;
 use apprentice::world::household::{Household, Kind};
-use apprentice::world::{Domain, Stage, Thing};
+use apprentice::world::{Show, Stage, Thing, World};
 use serde::{Deserialize, Serialize};
 
 use super::parts::{Unit, joined, parts, primitives, whole};

@@ -11,7 +11,7 @@ use apprentice::client::{Client, ClientError, OnClash, RejectionCode, Reply, Tol
 use apprentice::ids::{Digest, RequestId, Seq};
 use apprentice::language::{Outcome, Program, Step};
 use apprentice::world::household::{Household, Scene, Task};
-use apprentice::world::{Domain, Stage, StageError};
+use apprentice::world::{Stage, StageError, World};
 
 use super::meaning::{Aim, aim, carried_out_as_meant, run_for};
 

@@ -120,7 +120,7 @@ fn a_polite_teacher_gets_on_and_is_the_same_each_time() {
 #[test]
 fn meaning_is_free_of_walks_and_doors_and_of_nothing_else() {
     use apprentice::language::Program;
-    use apprentice::world::Domain;
+    use apprentice::world::World;
     let household = Household::new();
     let stage = Stage::Task { task: TASK.to_owned(), seed: 5 };
     let (scene, task) = household.stage(&stage).unwrap();

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use apprentice::language::Symbol;
 use apprentice::numerics::Rng;
 use apprentice::world::household::{Household, Kind};
-use apprentice::world::{Domain, Edition, Lexicon};
+use apprentice::world::{Edition, Lexicon, Words as _};
 
 use super::parts::Unit;
 use super::teacher::{Share, Teacher};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use apprentice::language::{Program, Step, Utterance};
 use apprentice::world::household::{Household, Kind, Room, Scene, Task};
-use apprentice::world::{Domain, Stage};
+use apprentice::world::{Stage, World};
 
 use super::scene_text::scene_file;
 use crate::corpus::{Corpus, Row};

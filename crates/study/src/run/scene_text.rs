@@ -116,7 +116,7 @@ fn numbered(kinds: &[&str], short: bool) -> Vec<String> {
 mod tests {
     use super::*;
     use apprentice::world::household::Household;
-    use apprentice::world::{Domain, Stage};
+    use apprentice::world::{Show, Stage, World};
 
     #[test]
     fn a_scene_is_read_back_as_it_was() {

@@ -4,8 +4,8 @@ use super::ExemplarSettings;
 use super::tokens::Token;
 use crate::parser::WordTable;
 
-/// Utterances made ready for the network: since W(e + p) = We + Wp, each distinct token and each
-/// position is transformed once, however often it occurs.
+/// Utterances prepared for the network. Because W(e + p) = We + Wp, each distinct token and each
+/// position is transformed only once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Batch {
     /// Fixed part of each distinct token's vector, `[tokens × dims]`.
@@ -23,9 +23,9 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// `sorts`: the sorts that have a trainable vector, sorted. A sort that has none stands for its
-    /// start word.
-    pub fn new(
+    /// `sorts`: the sorts that have a trainable vector, sorted. A sort without one has the vector
+    /// of its start word.
+    pub(super) fn new(
         settings: &ExemplarSettings,
         words: &WordTable,
         sorts: &[String],
@@ -84,16 +84,16 @@ impl Batch {
         self.sorts.push(sort);
     }
 
-    pub fn rows(&self) -> usize {
+    pub(super) fn rows(&self) -> usize {
         self.ends.len()
     }
 
-    pub fn tokens(&self) -> usize {
+    pub(super) fn tokens(&self) -> usize {
         self.sorts.len()
     }
 
     /// The cells of one utterance.
-    pub fn row(&self, index: usize) -> &[u32] {
+    pub(super) fn row(&self, index: usize) -> &[u32] {
         let start = if index == 0 { 0 } else { self.ends[index - 1] };
         &self.places[start as usize..self.ends[index] as usize]
     }

@@ -5,7 +5,7 @@ use super::{ExemplarSettings, ExemplarWeights, TrainFault};
 use crate::numerics::{Shape, Sink, gemm, normalise, relu};
 use crate::parser::WordTable;
 
-/// Word positions whose transform is kept; the few longer utterances compute the rest.
+/// Word positions whose transform is kept. Longer utterances are rare, and compute the rest.
 const POSITIONS_KEPT: usize = 32;
 
 /// The network in use: from tokens to embeddings.
@@ -19,7 +19,8 @@ pub(super) struct Encoder {
     positions: Vec<f32>,
 }
 
-/// What a pass through the network leaves behind, for the backward pass and for the next one.
+/// The results of a pass through the network, for the backward pass. The next pass uses the memory
+/// again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pass {
     /// Whole token vectors, `[tokens × dims]`.
@@ -39,7 +40,7 @@ pub(super) struct Pass {
 }
 
 impl Encoder {
-    pub fn new(
+    pub(super) fn new(
         settings: &ExemplarSettings,
         words: &'static WordTable,
         weights: &ExemplarWeights,
@@ -68,10 +69,10 @@ impl Encoder {
         Ok(Encoder { settings, words, layout, sorts, positions })
     }
 
-    /// `[rows × embedding]`. What stands in one row does not depend on the others.
+    /// The embeddings, `[rows × embedding]`. A row does not depend on other rows.
     ///
     /// - `parameters`: of the weights that this encoder was made for.
-    pub fn embed(&self, parameters: &[f32], rows: &[Vec<Token>]) -> Vec<f32> {
+    pub(super) fn embed(&self, parameters: &[f32], rows: &[Vec<Token>]) -> Vec<f32> {
         let batch = Batch::new(&self.settings, self.words, &self.sorts, rows);
         let mut longer = Vec::new();
         let positions = if batch.positions <= POSITIONS_KEPT {
@@ -106,8 +107,8 @@ pub(super) fn transform_positions(
     );
 }
 
-/// Tokens and positions are transformed apart and added, cut at 0, summed over the utterance, and
-/// sent through the MLP. `positions` holds at least the rows that `batch` needs.
+/// Tokens and positions are transformed separately and added, cut at 0, summed over the utterance,
+/// and passed through the MLP. `positions` holds at least the rows that `batch` needs.
 pub(super) fn forward(
     settings: &ExemplarSettings,
     layout: Layout,

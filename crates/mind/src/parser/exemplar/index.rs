@@ -5,11 +5,11 @@ use ndarray::{Array2, ArrayView1};
 use super::TrainFault;
 use crate::numerics::distance;
 
-/// Where every exemplar lies.
+/// The embeddings of all exemplars.
 ///
-/// `linfa-nn` finds the exemplars in range; since it borrows its points, a view of it is opened for
-/// each query. It promises no order and sums distances in an order of its own, so the range is a
-/// little wider than asked, and what it finds is measured again with our kernel and sorted by
+/// `linfa-nn` finds the exemplars in range. It borrows its points, so a view is opened for each
+/// query. It promises no order, and sums distances in its own order. So the range is a little wider
+/// than asked, and the distances of what it finds are computed again with our kernel and sorted by
 /// (distance, exemplar number).
 #[derive(Debug, Clone)]
 pub(super) struct ExemplarIndex {
@@ -21,8 +21,8 @@ const WIDER: (f32, f32) = (1.001, 1e-4);
 
 impl ExemplarIndex {
     /// - `points`: `[exemplars × width]`.
-    /// - errors: a point is not finite; the search would have no answer.
-    pub fn new(width: usize, points: Vec<f32>) -> Result<ExemplarIndex, TrainFault> {
+    /// - errors: a point is not finite, so it has no distance.
+    pub(super) fn new(width: usize, points: Vec<f32>) -> Result<ExemplarIndex, TrainFault> {
         if points.iter().any(|x| !x.is_finite()) {
             let reason = "an exemplar's embedding is not finite".to_owned();
             return Err(TrainFault::Weights { reason });
@@ -33,9 +33,9 @@ impl ExemplarIndex {
         Ok(ExemplarIndex { points })
     }
 
-    /// Every exemplar within `range` of the query, and the `nearest` ones whether within it or
-    /// not: (exemplar number, distance), nearest first, the older exemplar first among equals.
-    pub fn near(&self, query: &[f32], range: f32, nearest: usize) -> Vec<(u32, f32)> {
+    /// Every exemplar within `range` of the query, and the `nearest` ones even if they are outside:
+    /// (exemplar number, distance), nearest first. Among equals, the older exemplar comes first.
+    pub(super) fn near(&self, query: &[f32], range: f32, nearest: usize) -> Vec<(u32, f32)> {
         if query.iter().any(|x| !x.is_finite()) {
             return Vec::new();
         }
@@ -60,7 +60,7 @@ impl ExemplarIndex {
     }
 
     /// Every exemplar with its distance, in order of number.
-    pub fn every(&self, query: &[f32]) -> impl Iterator<Item = (u32, f32)> {
+    pub(super) fn every(&self, query: &[f32]) -> impl Iterator<Item = (u32, f32)> {
         (0..self.points.nrows()).map(move |number| (number as u32, self.distance(query, number)))
     }
 

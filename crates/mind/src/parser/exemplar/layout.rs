@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-/// Where each part of the learned parameters lies in their one flat list, so that one optimiser
-/// steps them all and a digest covers them all.
+/// The place of each part of the learned parameters in their flat list. One optimiser steps all of
+/// them, and one digest covers them.
 ///
 /// In order: `transform` `[dims × hidden]`, its bias `[hidden]`; the first layer of the MLP
 /// `[hidden × hidden]`, its bias; the second `[hidden × embedding]`, its bias; a vector of `[dims]`
@@ -35,37 +35,37 @@ impl Layout {
         start..start + sizes[index]
     }
 
-    pub fn transform(&self) -> Range<usize> {
+    pub(super) fn transform(&self) -> Range<usize> {
         self.part(0)
     }
-    pub fn transform_bias(&self) -> Range<usize> {
+    pub(super) fn transform_bias(&self) -> Range<usize> {
         self.part(1)
     }
-    pub fn first(&self) -> Range<usize> {
+    pub(super) fn first(&self) -> Range<usize> {
         self.part(2)
     }
-    pub fn first_bias(&self) -> Range<usize> {
+    pub(super) fn first_bias(&self) -> Range<usize> {
         self.part(3)
     }
-    pub fn second(&self) -> Range<usize> {
+    pub(super) fn second(&self) -> Range<usize> {
         self.part(4)
     }
-    pub fn second_bias(&self) -> Range<usize> {
+    pub(super) fn second_bias(&self) -> Range<usize> {
         self.part(5)
     }
-    pub fn sorts(&self) -> Range<usize> {
+    pub(super) fn sorts(&self) -> Range<usize> {
         self.part(6)
     }
-    pub fn sort(&self, sort: usize) -> Range<usize> {
+    pub(super) fn sort(&self, sort: usize) -> Range<usize> {
         let start = self.sorts().start + sort * self.dims;
         start..start + self.dims
     }
     /// The places of a and b.
-    pub fn classifier(&self) -> [usize; 2] {
+    pub(super) fn classifier(&self) -> [usize; 2] {
         let start = self.part(7).start;
         [start, start + 1]
     }
-    pub fn total(&self) -> usize {
+    pub(super) fn total(&self) -> usize {
         self.sizes().iter().sum()
     }
 }

@@ -1,5 +1,5 @@
-//! The paper's parser: an utterance means what the nearest known exemplar means, when it is near
-//! enough. Source: the paper, section 3.
+//! The paper's parser: an utterance means what its nearest exemplar means, if that is within the
+//! threshold. Source: the paper, section 3.
 
 mod batch;
 mod encoder;
@@ -42,19 +42,42 @@ pub struct Calibration<'a> {
 /// Why there is no parser.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TrainFault {
+    /// A setting has a value that no training can use.
     #[error("the parser setting {field} is {value}; allowed is {allowed}")]
-    Setting { field: &'static str, value: String, allowed: String },
+    Setting {
+        /// Its name.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// The allowed values, in words.
+        allowed: String,
+    },
+    /// There are no exemplars.
     #[error("there is no exemplar to learn from")]
     NoExemplars,
+    /// An exemplar has no words.
     #[error("exemplar {number} has no words")]
-    NoWords { number: usize },
+    NoWords {
+        /// Its place; 0-based.
+        number: usize,
+    },
+    /// The loss is not finite.
     #[error("the loss became {loss} at step {step}; lower the learning rate")]
-    Diverged { step: usize, loss: String },
+    Diverged {
+        /// The step.
+        step: usize,
+        /// The loss, in nats.
+        loss: String,
+    },
+    /// Stored weights do not belong to these settings and exemplars.
     #[error("the learned weights do not fit: {reason}; train again")]
-    Weights { reason: String },
+    Weights {
+        /// A sentence.
+        reason: String,
+    },
 }
 
-/// What a training learned; with settings, word table and exemplars it is the parser again.
+/// What a training learned. Settings, word table, exemplars and these weights make the parser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExemplarWeights {
@@ -66,7 +89,7 @@ pub struct ExemplarWeights {
     pub threshold: f32,
 }
 
-/// Exemplars, the network that places utterances among them, and how near is near enough.
+/// The exemplars, the network that embeds utterances, and the threshold.
 #[derive(Debug, Clone)]
 pub struct ExemplarParser {
     tokeniser: Tokeniser,
@@ -91,7 +114,7 @@ impl ExemplarParser {
     ) -> Result<(ExemplarParser, Figures), TrainFault> {
         settings.check()?;
         let (sorts, parameters, mut figures) = train::train(settings, words, seed, examples)?;
-        // The threshold needs the parser that it will guard.
+        // The threshold is set with the trained parser.
         let weights = ExemplarWeights { sorts, parameters, threshold: settings.beta };
         let mut parser = ExemplarParser::restore(settings, words, examples, weights)?;
         parser.weights.threshold =
@@ -126,26 +149,28 @@ impl ExemplarParser {
         Ok(ExemplarParser { tokeniser, encoder, weights, exemplars, by_form, index, nearest })
     }
 
+    /// What training learned.
     pub fn weights(&self) -> &ExemplarWeights {
         &self.weights
     }
 
-    /// In the order they were given; a [`Scored::number`] is a place in this list.
+    /// The exemplars, in the order of training. A [`Scored::number`] is a place in this list.
     pub fn exemplars(&self) -> &[Exemplar] {
         &self.exemplars
     }
 
-    /// An utterance is understood when an exemplar is at most this far (L2 between embeddings).
+    /// The largest distance of an exemplar that is understood (L2 between embeddings).
     pub fn threshold(&self) -> f32 {
         self.weights.threshold
     }
 
-    /// `[embedding]`; of length 1 where the settings say so.
+    /// The embedding of an utterance: `[embedding]`, of length 1 if the settings say so.
     pub fn embed(&self, lifted: &LiftedUtterance) -> Vec<f32> {
         self.embed_all(&[lifted])
     }
 
-    /// `[utterances × embedding]`; each row as [`ExemplarParser::embed`] gives it.
+    /// The embeddings of several utterances: `[utterances × embedding]`, each row as
+    /// [`ExemplarParser::embed`] gives it.
     fn embed_all(&self, utterances: &[&LiftedUtterance]) -> Vec<f32> {
         let rows: Vec<_> = utterances.iter().map(|u| self.tokeniser.tokens(u)).collect();
         self.encoder.embed(&self.weights.parameters, &rows)
@@ -165,7 +190,7 @@ impl ExemplarParser {
         Near { exemplar: utterance, program, distance, number }
     }
 
-    /// As [`SemanticParser::parse`], with another threshold in the place of its own.
+    /// [`SemanticParser::parse`] with another threshold than its own.
     pub fn parse_within(&self, clause: &Clause, threshold: f32) -> Parse {
         let lifted = &clause.lifted;
         if lifted.words.is_empty() {

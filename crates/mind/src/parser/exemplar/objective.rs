@@ -8,9 +8,9 @@ use crate::numerics::{
 
 /// The loss of the pair classifier over all pairs of exemplars, and its gradient.
 ///
-/// Over-sampling positives until they balance is the same, in expectation, as giving all positive
-/// pairs together the weight of all negative pairs together; that is done here, over the whole
-/// n × n matrix, so that each utterance is embedded once a step.
+/// Over-sampling positive pairs until they balance the negative ones has the same expectation as
+/// giving all positive pairs together the weight of all negative pairs together. That is done here,
+/// over the whole n × n matrix, so that each utterance is embedded once per step.
 pub(super) struct Objective<'a> {
     settings: &'a ExemplarSettings,
     layout: Layout,
@@ -26,7 +26,7 @@ pub(super) struct Objective<'a> {
     work: Work,
 }
 
-/// Room for one step; nothing is allocated after the first.
+/// Memory for one step. Nothing is allocated after the first step.
 #[derive(Default)]
 struct Work {
     positions: Vec<f32>,
@@ -44,7 +44,7 @@ struct Work {
 
 impl<'a> Objective<'a> {
     /// `classes[i] == classes[j]` says that exemplars i and j have the same program.
-    pub fn new(
+    pub(super) fn new(
         settings: &'a ExemplarSettings,
         layout: Layout,
         batch: &'a Batch,
@@ -61,7 +61,7 @@ impl<'a> Objective<'a> {
             counts[(truth[at] == 0.0) as usize] += 1;
             counts
         });
-        // A class without a pair leaves its half unused rather than divided by zero.
+        // A class without a pair leaves its half unused, so that nothing is divided by zero.
         let weights = counts.map(|count: usize| 0.5 / count.max(1) as f64);
         let weight = (0..rows * rows).map(|at| match counted(at) {
             true => weights[(truth[at] == 0.0) as usize] as f32,
@@ -73,7 +73,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Overwrites `gradient`; returns the loss in nats, before the step that follows.
-    pub fn evaluate(&mut self, parameters: &[f32], gradient: &mut [f32]) -> f64 {
+    pub(super) fn evaluate(&mut self, parameters: &[f32], gradient: &mut [f32]) -> f64 {
         let Objective { settings, layout, batch, pass, work, .. } = self;
         let encoded = &self.encoded_positions;
         transform_positions(*layout, parameters, encoded, &mut work.positions);
@@ -104,7 +104,7 @@ impl<'a> Objective<'a> {
         }
         gradient[a_at] = dot(&work.slopes, &work.cosines);
         gradient[b_at] = sum(&work.slopes);
-        // The matrix is symmetric and each pair stands in it twice, hence 2a.
+        // The matrix is symmetric and has each pair twice, hence 2a.
         work.embeddings.resize(rows * width, 0.0);
         let shape = Shape { rows, inner: rows, columns: width };
         gemm(shape, &work.slopes, &pass.embeddings, &mut work.embeddings, Sink::Replace);
@@ -114,7 +114,7 @@ impl<'a> Objective<'a> {
         for ((slope, point), norm) in slopes.zip(points).zip(&pass.norms) {
             slope.iter_mut().for_each(|s| *s *= 2.0 * a);
             if unit && *norm > 0.0 {
-                // Only what is at right angles to the unit vector turns it.
+                // Only the part at right angles to the unit vector changes its direction.
                 let along = dot(slope, point);
                 slope.iter_mut().zip(point).for_each(|(s, p)| *s = (*s - along * p) / norm);
             }
@@ -201,8 +201,9 @@ fn add_rows(x: &[f32], out: &mut [f32]) {
     }
 }
 
-/// Balanced cross-entropy in nats. A logarithm per pair would be most of its cost, so probabilities
-/// are multiplied forty at a time: each is at least 1e-7, and 1e-280 is still a number.
+/// Balanced cross-entropy in nats. One logarithm per pair would take most of the time, so forty
+/// probabilities at a time are multiplied first: each is at least 1e-7, and 1e-280 is still a
+/// number.
 fn cross_entropy(probabilities: &[f32], truth: &[f32], weight: &[f32], weights: [f64; 2]) -> f64 {
     let mut loss = [0.0, 0.0];
     let pieces = probabilities.chunks(40).zip(truth.chunks(40)).zip(weight.chunks(40));

@@ -14,6 +14,7 @@ pub struct ExemplarSettings {
     pub hidden: usize,
     /// Numbers per embedding.
     pub embedding: usize,
+    /// How far a step goes.
     pub learning_rate: f32,
     /// Share of each weight taken away per step and unit of learning rate.
     pub weight_decay: f32,
@@ -43,6 +44,7 @@ pub struct ExemplarSettings {
     pub fixture_weight: f32,
     /// Exemplars reported as nearest.
     pub nearest: usize,
+    /// How the threshold is set.
     pub threshold: ThresholdReading,
     /// What the threshold must reach on held-out utterances, between 0 and 1.
     pub precision: f64,
@@ -52,7 +54,7 @@ pub struct ExemplarSettings {
     pub salt: String,
 }
 
-/// What "a threshold at 90 % precision" means; the paper's text allows each.
+/// What "a threshold at 90 % precision" means. The paper's text allows each of these readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdReading {
@@ -68,7 +70,7 @@ pub enum ThresholdReading {
 }
 
 impl Default for ExemplarSettings {
-    /// The paper's parts, with our choices where it is silent.
+    /// The paper's values, and ours where the paper gives none.
     fn default() -> ExemplarSettings {
         let stop_words = "the up down on off of in to then a an back front out from with inside \
                           outside below above top";
@@ -78,8 +80,8 @@ impl Default for ExemplarSettings {
             learning_rate: 3e-3,
             weight_decay: 0.0,
             steps_max: 300,
-            // Going on to 0.05 takes four times the steps and understands no more of the recorded
-            // sentences: the network learns the exemplars by heart and the threshold shrinks.
+            // 0.05 takes four times the steps and understands no more of the recorded sentences:
+            // the network fits the exemplars too closely, and the threshold shrinks.
             stop_loss: 0.07,
             a_start: 5.0,
             b_start: -2.5,
@@ -88,8 +90,8 @@ impl Default for ExemplarSettings {
             normalise: true,
             positions: true,
             word_scale: 1.0,
-            // At 1 the positions are longer than the words and drown them: on recorded sentences the
-            // best guess is right for 89 % of primitives against 90 %, and for 25 % of other
+            // At 1 the positions are longer than the words and outweigh them: on recorded sentences
+            // the best guess is right for 89 % of primitives against 90 %, and for 25 % of other
             // people's wordings of a lesson against 40 %.
             position_scale: 0.1,
             slot_words: BTreeMap::from([("obj".to_owned(), "object".to_owned())]),
@@ -104,7 +106,9 @@ impl Default for ExemplarSettings {
 }
 
 impl ExemplarSettings {
-    /// - errors: a value that no training could use, by name.
+    /// Checks every value.
+    ///
+    /// - errors: [`TrainFault::Setting`], a value that no training can use.
     pub fn check(&self) -> Result<(), TrainFault> {
         size("hidden", self.hidden, 1_024)?;
         size("embedding", self.embedding, 1_024)?;

@@ -12,7 +12,7 @@ struct Trial {
     right: bool,
 }
 
-/// The threshold of `settings.threshold`'s reading, never below `settings.beta`; notes what it
+/// The threshold in the reading of `settings.threshold`, never below `settings.beta`. Notes what it
 /// accepts in `figures`.
 pub(super) fn calibrate(
     settings: &ExemplarSettings,
@@ -23,9 +23,9 @@ pub(super) fn calibrate(
     let Calibration { variants, unknown } = calibration;
     let asked = variants.iter().map(|variant| (&variant.utterance, Some(&variant.program)));
     let variant_trials = trials(parser, asked.collect());
-    // Nobody asked what an unknown request means, only that the programs of the variants are no
-    // answer. Where a lesson is nearest, neither right nor wrong is known: it may be what the
-    // person taught. Counting it as wrong would narrow the threshold with every lesson.
+    // An unknown request has no right program; it is only known that the programs of the variants
+    // are wrong for it. If a lesson is nearest, nothing is known: it may be what the person taught.
+    // Counting it as wrong would make the threshold smaller with every lesson.
     let answered: BTreeSet<LiftedProgram> =
         variants.iter().map(|variant| variant.program.canonical()).collect();
     let asked = unknown.iter().map(|utterance| (utterance, None)).collect();
@@ -72,8 +72,8 @@ pub(super) fn calibrate(
     threshold
 }
 
-/// Notes the share of exemplars whose nearest exemplar, the shortcut for exact forms aside, gives
-/// their own program: below 1 only where different programs look alike without stop words.
+/// Notes the share of exemplars whose nearest exemplar has their own program, without the rule for
+/// exact forms. It is below 1 only if different programs have the same words except stop words.
 pub(super) fn measure(parser: &ExemplarParser, figures: &mut Figures) {
     let exemplars = parser.exemplars.iter();
     let asked = exemplars.map(|exemplar| (&exemplar.utterance, Some(&exemplar.program)));
@@ -96,7 +96,7 @@ fn trials(
         let trial = |(number, distance): (u32, f32)| {
             let found = &parser.exemplars[number as usize].program;
             let right = program == Some(found);
-            // What the utterance's mentions cannot fill is never a candidate.
+            // A program that the mentions cannot fill is never a candidate.
             (found.slots() <= slots).then_some(Trial { number, distance, right })
         };
         let mut trials: Vec<Trial> = parser.index.every(embedding).filter_map(trial).collect();
@@ -123,8 +123,8 @@ fn largest_precise(mut trials: Vec<Trial>, precision: f64) -> Option<f32> {
     found
 }
 
-/// The smallest distance within which `share` of the utterances have a right exemplar; where so
-/// many have none at all, the distance that covers all the others.
+/// The smallest distance within which `share` of the utterances have a right exemplar; if fewer
+/// have one, the distance that covers all that have.
 fn smallest_covering(utterances: &[Vec<Trial>], share: f64) -> Option<f32> {
     let nearest_right = |trials: &Vec<Trial>| trials.iter().find(|trial| trial.right).copied();
     let mut right: Vec<f32> =

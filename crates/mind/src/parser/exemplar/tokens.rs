@@ -17,12 +17,12 @@ pub(super) struct Tokeniser {
 }
 
 impl Tokeniser {
-    pub fn new(settings: &ExemplarSettings) -> Tokeniser {
+    pub(super) fn new(settings: &ExemplarSettings) -> Tokeniser {
         Tokeniser { stop_words: settings.stop_words.iter().cloned().collect() }
     }
 
     /// The tokens without stop words; with them where nothing else would be left.
-    pub fn tokens(&self, utterance: &LiftedUtterance) -> Vec<Token> {
+    pub(super) fn tokens(&self, utterance: &LiftedUtterance) -> Vec<Token> {
         let kept: Vec<Token> = utterance
             .words
             .iter()

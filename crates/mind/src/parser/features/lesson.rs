@@ -5,11 +5,11 @@ use super::settings::{LessonSettings, LessonWeights};
 use crate::language::{Clause, Exemplar, LiftedArg, Roles, Word};
 use crate::numerics::{dot, ln, sigmoid};
 
-/// What `new` and `new_back` are when neither side has a word that simple requests hardly use.
+/// The values of `new` and `new_back` if neither side has a word that simple requests hardly use.
 const NOTHING_NEW: f32 = 0.6;
 
-/// How likely an utterance asks for the same as each lesson. Everything about the lessons is
-/// worked out once, when the mind is made.
+/// Judges how likely an utterance asks for the same as each lesson. Everything about the lessons is
+/// computed once, when the mind is made.
 #[derive(Debug, Clone)]
 pub(super) struct LessonJudge {
     /// The vectors of all words of all lessons, each word once.
@@ -33,7 +33,7 @@ struct Facts {
 }
 
 impl LessonJudge {
-    pub fn new(knowledge: &Knowledge, roles: &Roles, lessons: &[Exemplar]) -> LessonJudge {
+    pub(super) fn new(knowledge: &Knowledge, roles: &Roles, lessons: &[Exemplar]) -> LessonJudge {
         let mut vocabulary = Vec::new();
         let mut places: BTreeMap<String, usize> = BTreeMap::new();
         let mut place = |word: &str| {
@@ -66,7 +66,7 @@ impl LessonJudge {
     /// Per lesson a probability.
     ///
     /// - `seed_cosine`: the cosine of the utterance to the nearest seed.
-    pub fn judge(
+    pub(super) fn judge(
         &self,
         knowledge: &Knowledge,
         weights: &LessonSettings,
@@ -140,7 +140,8 @@ impl Heard<'_> {
             + weights.one
     }
 
-    /// The best nearness of two new words, and the mean over the lesson's of their best.
+    /// The best nearness of two new words, and the mean over the lesson's new words of their best
+    /// nearness.
     fn news(&self, lesson: &Facts) -> (f32, f32) {
         match (self.sentence.new.is_empty(), lesson.new.is_empty()) {
             (true, true) => return (NOTHING_NEW, NOTHING_NEW),
@@ -166,7 +167,7 @@ fn verbs(knowledge: &Knowledge, clause: &Clause) -> Vec<String> {
     clauses.iter().filter_map(|c| grammar.main_verb(&c.lifted.words)).map(|v| v.word).collect()
 }
 
-/// Whether the lesson begins with what is in the hand.
+/// Whether the lesson begins with the thing in the hand.
 fn is_request(roles: &Roles, lesson: &Exemplar) -> bool {
     let mut acts = lesson.program.steps.iter().map(|step| &step.operator);
     acts.find(|operator| !roles.goes(operator) && !roles.is_door(operator))

@@ -1,6 +1,6 @@
-//! The parser of recipe `default`: two judges, each a logistic over a few features of words, with
-//! weights learned once from recorded people. A lesson is known from the moment it is taught,
-//! because nothing is trained per person but thresholds. Source: `docs/features.md`.
+//! The parser of recipe `default`: two judges, each a logistic regression over a few features of
+//! words, with weights learned once from recorded people. Only thresholds are trained per person,
+//! so a lesson is known from the moment it is taught. Source: `docs/features.md`.
 
 mod lesson;
 mod primitive;
@@ -26,13 +26,13 @@ use lesson::LessonJudge;
 use primitive::{Judged, PrimitiveJudge};
 use sentence::{Knowledge, Sentence};
 
-/// A primitive this much (in logits) less likely than the likeliest is not what was meant, even
-/// if the world forbids the likeliest.
+/// A primitive this much (in logits) less likely than the likeliest one was not meant, even if the
+/// world does not allow the likeliest.
 const RIVAL_WITHIN: f32 = 2.5;
 /// A verb that people used at least so often for going somewhere may stand without a goal.
 const MOVES_MIN: u32 = 3;
 
-/// What a training found; with settings, word table and exemplars it is the parser again.
+/// What a training found. Settings, word table, exemplars and these weights make the parser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FeaturesWeights {
@@ -42,7 +42,7 @@ pub struct FeaturesWeights {
     pub lessons: Vec<f32>,
 }
 
-/// Judges every clause against the primitives and every utterance against the lessons.
+/// Compares each clause with the primitives, and each utterance with the lessons.
 #[derive(Debug, Clone)]
 pub struct FeaturesParser {
     settings: FeaturesSettings,
@@ -58,7 +58,7 @@ pub struct FeaturesParser {
 }
 
 impl FeaturesParser {
-    /// Sets the thresholds by `calibration` and the seeds. A pure function.
+    /// Sets the thresholds from `calibration` and the seeds. A pure function.
     ///
     /// - `seeds`: how many of the examples, from the first, are seeds.
     pub fn train(
@@ -183,11 +183,12 @@ impl FeaturesParser {
         found
     }
 
+    /// What training found.
     pub fn weights(&self) -> &FeaturesWeights {
         &self.weights
     }
 
-    /// In the order they were given; a [`Scored::number`] is a place in this list.
+    /// The exemplars, in the order of training. A [`Scored::number`] is a place in this list.
     pub fn exemplars(&self) -> &[Exemplar] {
         &self.exemplars
     }

@@ -3,11 +3,11 @@ use super::settings::PrimitiveWeights;
 use crate::language::{Clause, Exemplar, Habits, LiftedArg, Symbol, Word};
 use crate::numerics::{dot, ln};
 
-/// Smoothing of the counts, and how many words a clause may have that nobody used.
+/// Smoothing of the counts, and the number of words outside the recordings that it allows for.
 const SMOOTHING: f32 = 0.3;
 const VOCABULARY: f32 = 20.0;
 
-/// How likely a clause means each of a domain's primitives.
+/// Judges how likely a clause means each primitive of a world.
 #[derive(Debug, Clone)]
 pub(super) struct PrimitiveJudge {
     pub operators: Vec<Operator>,
@@ -41,7 +41,7 @@ pub(super) struct Judged {
 }
 
 impl PrimitiveJudge {
-    pub fn new(knowledge: &Knowledge, seeds: &[Exemplar]) -> PrimitiveJudge {
+    pub(super) fn new(knowledge: &Knowledge, seeds: &[Exemplar]) -> PrimitiveJudge {
         let mut operators: Vec<Operator> = Vec::new();
         let mut known = Vec::new();
         for (number, exemplar) in seeds.iter().enumerate() {
@@ -66,19 +66,19 @@ impl PrimitiveJudge {
     }
 
     /// The cosine to the nearest seed.
-    pub fn seed_cosine(&self, sentence: &Sentence) -> f32 {
+    pub(super) fn seed_cosine(&self, sentence: &Sentence) -> f32 {
         self.seeds.iter().map(|seed| dot(&seed.whole, &sentence.whole)).fold(-1.0, f32::max)
     }
 
     /// Every operator, likeliest first (ties: the one that seeds name first).
-    pub fn judge(
+    pub(super) fn judge(
         &self,
         knowledge: &Knowledge,
         weights: &PrimitiveWeights,
         words: &[Word],
         sentence: &Sentence,
     ) -> Vec<Judged> {
-        // "As near as the nearest of the others" needs others.
+        // The features compare an operator with the others, so there must be others.
         if self.operators.len() < 2 || sentence.items.is_empty() {
             return Vec::new();
         }

@@ -10,21 +10,23 @@ const SIF: f32 = 1e-3;
 const PARTICLE_WEIGHT: f32 = 0.25;
 const FIXTURE_WEIGHT: f32 = 0.4;
 const OBJECT_WEIGHT: f32 = 0.15;
-/// The word whose vector stands for a thing of which nothing but its slot is known.
+/// The word whose vector is used for a slot without a fixture.
 const OBJECT: &str = "object";
 /// A word is new when it stands in a smaller share of simple clauses than this.
 const RARE: f64 = 0.01;
 
-/// What is known about words before anybody taught anything.
+/// What is known about words before anybody has taught anything.
 #[derive(Debug, Clone, Copy)]
 pub struct Background<'a> {
+    /// The recipe's lists.
     pub lists: &'a WordLists,
-    /// The domain's.
+    /// The lexicon's.
     pub adjectives: &'a [String],
-    /// The domain's fixtures and their words.
+    /// The lexicon's fixtures and their words.
     pub fixtures: &'a BTreeMap<Symbol, String>,
+    /// Of the world's operators.
     pub roles: &'a Roles,
-    /// Absent in a domain that nobody was recorded in.
+    /// None in a world without recordings.
     pub habits: Option<&'a Arc<Habits>>,
 }
 
@@ -50,7 +52,7 @@ pub(super) struct Item {
     pub vector: Vec<f32>,
 }
 
-/// What the judges know of an utterance: its lifted words alone, no scene.
+/// What the judges use of an utterance: its lifted words, and nothing of the scene.
 #[derive(Debug, Clone)]
 pub(super) struct Sentence {
     pub items: Vec<Item>,
@@ -65,7 +67,7 @@ pub(super) struct Sentence {
 }
 
 impl Knowledge {
-    pub fn new(words: &'static WordTable, background: Background<'_>) -> Knowledge {
+    pub(super) fn new(words: &'static WordTable, background: Background<'_>) -> Knowledge {
         Knowledge {
             words,
             lists: background.lists.clone(),
@@ -75,22 +77,22 @@ impl Knowledge {
         }
     }
 
-    pub fn grammar(&self) -> Grammar<'_> {
+    pub(super) fn grammar(&self) -> Grammar<'_> {
         Grammar { lists: &self.lists, adjectives: &self.adjectives }
     }
 
     /// Of length 1.
-    pub fn vector(&self, word: &str) -> Vec<f32> {
+    pub(super) fn vector(&self, word: &str) -> Vec<f32> {
         let mut vector = self.words.vector(word);
         normalise(&mut vector);
         vector
     }
 
-    pub fn weight(&self, word: &str) -> f32 {
+    pub(super) fn weight(&self, word: &str) -> f32 {
         SIF / (SIF + self.words.frequency(word))
     }
 
-    pub fn sentence(&self, words: &[Word]) -> Sentence {
+    pub(super) fn sentence(&self, words: &[Word]) -> Sentence {
         let items: Vec<Item> = words.iter().filter_map(|word| self.item(word)).collect();
         let is_new = |item: &Item| {
             item.plain
@@ -140,7 +142,7 @@ impl Knowledge {
     }
 
     /// The features that [`Habits`] count, each once.
-    pub fn habit_words(&self, words: &[Word], verb: Option<&Verb>) -> BTreeSet<String> {
+    pub(super) fn habit_words(&self, words: &[Word], verb: Option<&Verb>) -> BTreeSet<String> {
         let lists = &self.lists;
         let base = verb.map_or("", |verb| verb.word.as_str());
         let named = words.iter().filter(|word| matches!(word, Word::Slot { .. })).count();
@@ -148,7 +150,8 @@ impl Knowledge {
         if let Some(verb) = verb.filter(|verb| !verb.particle.is_empty()) {
             found.insert(format!("V:{base}_{}", verb.particle));
         }
-        // "take it TO", "take it FROM": the first function word behind a mention tells verbs apart.
+        // "take it TO", "take it FROM": the first function word after a mention distinguishes uses
+        // of a verb.
         let mut behind_mention = false;
         for (place, word) in words.iter().enumerate() {
             match word {

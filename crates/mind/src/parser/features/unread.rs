@@ -2,12 +2,12 @@ use super::sentence::Knowledge;
 use crate::language::{Verb, Word};
 
 impl Knowledge {
-    /// How many words of a clause ask for more than its main verb does: another verb that nobody
-    /// used for a primitive ("to chill it", "get it wet"), a second clause without a mark, or a
+    /// How many words of a clause ask for more than its main verb: another verb that was never
+    /// recorded for a primitive ("to chill it", "get it wet"), a second clause without a mark, or a
     /// time to wait.
     ///
     /// A verb counts only where a verb can stand, so "the rinsed mug" and "the wet cloth" do not.
-    pub fn unread(&self, words: &[Word], verb: Option<&Verb>) -> usize {
+    pub(super) fn unread(&self, words: &[Word], verb: Option<&Verb>) -> usize {
         let text = |at: usize| match words.get(at) {
             Some(Word::Text(text)) => Some(text.as_str()),
             _ => None,

@@ -1,5 +1,5 @@
-//! A core grammar: it answers what it was written for, exactly, and nothing else. The first half of
-//! the paper's baseline (section 4); no lesson changes it.
+//! A hand-written grammar. It answers exactly the sentences it was written for, and no lesson
+//! changes it. It is the first half of the paper's baseline (section 4).
 
 mod rules;
 mod settings;
@@ -14,12 +14,12 @@ pub use settings::GrammarSettings;
 use super::{Parse, Scored, SemanticParser, TrainFault};
 use crate::language::{Answerer, Clause, Exemplar, LiftedProgram, LiftedUtterance, Near};
 
-/// What a grammar learned: nothing. Stored all the same, so that every mind says what it has.
+/// What a grammar learned: nothing. It is stored so that every mind has its weights.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GrammarWeights {}
 
-/// A grammar, and the exemplars that it was held against.
+/// A grammar, and the exemplars of the mind.
 #[derive(Debug, Clone)]
 pub struct GrammarParser {
     rules: Rules,
@@ -27,7 +27,9 @@ pub struct GrammarParser {
 }
 
 impl GrammarParser {
-    /// - `exemplars`: seeds first, then lessons. They only say which of them an answer is like.
+    /// Reads the grammar.
+    ///
+    /// - `exemplars`: seeds first, then lessons. An answer names the one that is like it.
     /// - errors: a grammar that cannot be read; no exemplars.
     pub fn new(
         settings: &GrammarSettings,
@@ -44,6 +46,7 @@ impl GrammarParser {
         }
     }
 
+    /// Seeds first, then lessons in order.
     pub fn exemplars(&self) -> &[Exemplar] {
         &self.exemplars
     }
@@ -85,7 +88,7 @@ impl SemanticParser for GrammarParser {
         }
     }
 
-    /// One reading is all that it gives.
+    /// A grammar gives one reading at most.
     fn sure_of_order(&self) -> bool {
         true
     }

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use super::GrammarSettings;
 use crate::language::{LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Symbol, Word};
 
-/// A grammar made ready for reading.
+/// A grammar prepared for reading.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     silent: Vec<String>,
@@ -23,7 +23,7 @@ enum Item {
     Argument(usize, u8),
 }
 
-/// The words that are not silent. A mention stands there with its number, from 1.
+/// The words that are not silent. A mention has its number, from 1.
 struct Tokens<'u> {
     words: Vec<(&'u Word, u8)>,
 }
@@ -32,7 +32,7 @@ struct Tokens<'u> {
 type End = (usize, Option<u8>);
 
 impl Rules {
-    pub fn compile(settings: &GrammarSettings) -> Result<Rules, (&'static str, String)> {
+    pub(super) fn compile(settings: &GrammarSettings) -> Result<Rules, (&'static str, String)> {
         let names: Vec<&String> = settings.classes.keys().collect();
         let mut classes = Vec::new();
         for (name, phrases) in &settings.classes {
@@ -57,7 +57,7 @@ impl Rules {
             let pattern = items(&names, pattern).map_err(fault)?;
             let numbers = |number: u8| pattern.iter().filter(move |item| is(item, number)).count();
             let count = pattern.iter().filter(|item| matches!(item, Item::Argument(..))).count();
-            // So every slot of the program is filled, whatever the words.
+            // So every slot of the program is filled for all words.
             if let Some(odd) = (1..=count as u8).find(|&number| numbers(number) != 1) {
                 return Err(fault(format!("expected the argument {odd} once")));
             }
@@ -74,8 +74,8 @@ impl Rules {
         Ok(Rules { silent, classes, requests })
     }
 
-    /// What the first request that reads the whole utterance means.
-    pub fn read(&self, utterance: &LiftedUtterance) -> Option<LiftedProgram> {
+    /// The meaning of the first request that reads the whole utterance.
+    pub(super) fn read(&self, utterance: &LiftedUtterance) -> Option<LiftedProgram> {
         let mut mentions = 0;
         let numbered = utterance.words.iter().map(|word| {
             mentions += u8::from(matches!(word, Word::Slot { .. }));
@@ -95,7 +95,7 @@ fn is(item: &Item, number: u8) -> bool {
     matches!(item, Item::Argument(_, found) if *found == number)
 }
 
-/// One utterance being read: what was found out about its places so far.
+/// An utterance that is being read, with what is known about its places so far.
 struct Reading<'r, 'u> {
     rules: &'r Rules,
     tokens: Tokens<'u>,
@@ -104,8 +104,8 @@ struct Reading<'r, 'u> {
 }
 
 impl Reading<'_, '_> {
-    /// Whether the pattern reads everything from `at` on. Of several ways, the one that makes the
-    /// first phrases shortest counts: "put it in the pot on the stove" puts it in the pot.
+    /// Whether the pattern reads everything from `at` on. Of several ways, the one with the
+    /// shortest first phrases counts: "put it in the pot on the stove" puts it in the pot.
     fn whole(&mut self, pattern: &[Item], at: usize, arguments: &mut BTreeMap<u8, u8>) -> bool {
         let Some((first, rest)) = pattern.split_first() else {
             return at == self.tokens.words.len();

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-/// Where each part of the learned parameters lies in their one flat list.
+/// The place of each part of the learned parameters in their flat list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     /// Numbers per word.
@@ -10,7 +10,7 @@ pub(super) struct Layout {
     pub token: usize,
     /// Tokens that can be written: operators, the end, constants.
     pub writes: usize,
-    /// Tokens that the decoder can be told: those, and a slot of each number.
+    /// Tokens in the input of the decoder: those that can be written, and a slot of each number.
     pub tokens: usize,
 }
 
@@ -23,10 +23,10 @@ pub(super) enum Part {
     ReadState(usize),
     /// `[4·units]`.
     ReadBias(usize),
-    /// From what was read to the decoder's first cells, `[2·units × units]` and `[units]`.
+    /// From the encoder's states to the decoder's first cells, `[2·units × units]` and `[units]`.
     Bridge,
     BridgeBias,
-    /// From what was read to what states are compared with, `[2·units × units]`.
+    /// From the encoder's states to the keys of attention, `[2·units × units]`.
     Keys,
     /// `[tokens × token]`.
     Tokens,
@@ -35,13 +35,13 @@ pub(super) enum Part {
     /// `[units × 4·units]`.
     WriteState,
     WriteBias,
-    /// From state and context to what is written, `[3·units × writes]` and `[writes]`.
+    /// From state and context to the scores of tokens, `[3·units × writes]` and `[writes]`.
     Output,
     OutputBias,
 }
 
 impl Part {
-    pub const ALL: [Part; 15] = [
+    pub(super) const ALL: [Part; 15] = [
         Part::ReadWord(0),
         Part::ReadState(0),
         Part::ReadBias(0),
@@ -62,7 +62,7 @@ impl Part {
 
 impl Layout {
     /// Rows and columns; a bias has one row.
-    pub fn shape(&self, part: Part) -> (usize, usize) {
+    pub(super) fn shape(&self, part: Part) -> (usize, usize) {
         let Layout { dims, units, token, writes, tokens } = *self;
         match part {
             Part::ReadWord(_) => (dims, 4 * units),
@@ -77,7 +77,7 @@ impl Layout {
         }
     }
 
-    pub fn at(&self, part: Part) -> Range<usize> {
+    pub(super) fn at(&self, part: Part) -> Range<usize> {
         let size = |part: Part| {
             let (rows, columns) = self.shape(part);
             rows * columns
@@ -87,7 +87,7 @@ impl Layout {
         start..start + size(part)
     }
 
-    pub fn total(&self) -> usize {
+    pub(super) fn total(&self) -> usize {
         self.at(Part::Tokens).end
     }
 }

@@ -1,10 +1,10 @@
 //! The neural half of the paper's baseline: a sequence-to-sequence model with attention and
 //! copying, after Jia and Liang 2016 ("Data Recombination for Neural Semantic Parsing").
 //!
-//! A bidirectional LSTM reads the lifted utterance; an LSTM writes the lifted program, token by
-//! token, each time looking at what was read. Slots are not written but copied from where they
-//! stand, by the score that a look gives to their place. Only tokens that lead to a program may
-//! come next. Words have the recipe's frozen vectors, so an unknown word is like its neighbours.
+//! A bidirectional LSTM reads the lifted utterance. An LSTM writes the lifted program token by
+//! token, with attention to what was read. Slots are copied from their places in the utterance, by
+//! their attention scores. Only tokens that lead to a program are allowed. Words have the recipe's
+//! fixed vectors, so a word that was never taught is treated like words with similar vectors.
 //!
 //! It always answers: the paper's baseline has no *not sure*.
 
@@ -53,10 +53,11 @@ pub struct Seq2SeqParser {
 }
 
 impl Seq2SeqParser {
-    /// What distances are held against: 1 − the probability of a program is never more.
+    /// The largest distance that counts as understood. A distance is 1 − the probability of a
+    /// program, so all are within it.
     pub const THRESHOLD: f32 = 1.0;
 
-    /// A pure function: equal arguments give equal bits, on every machine.
+    /// Trains a model. A pure function: equal arguments give equal bits, on every machine.
     ///
     /// - `examples`: `seeds` seeds, then lessons in order.
     pub fn train(
@@ -104,10 +105,12 @@ impl Seq2SeqParser {
         Ok(Seq2SeqParser { settings, words, vocabulary, layout, weights, exemplars })
     }
 
+    /// What training learned.
     pub fn weights(&self) -> &Seq2SeqWeights {
         &self.weights
     }
 
+    /// Seeds first, then lessons in order.
     pub fn exemplars(&self) -> &[Exemplar] {
         &self.exemplars
     }
@@ -130,8 +133,8 @@ impl Seq2SeqParser {
     }
 }
 
-/// The examples that are learned from. A seed keeps its program, so a lesson with a seed's words and
-/// another program is none of them.
+/// The examples that are learned from. A seed keeps its program, so a lesson with a seed's words
+/// and another program is none of them.
 fn learned(examples: &[Exemplar], seeds: usize) -> impl Iterator<Item = &Exemplar> {
     let (first, lessons) = examples.split_at(seeds.min(examples.len()));
     let against = |lesson: &&Exemplar| {

@@ -3,23 +3,23 @@ use super::reader::{Reader, Words};
 use super::vocabulary::Vocabulary;
 use super::writer::{Target, Writer};
 
-/// What programs cost under some parameters, and how to change these.
+/// The loss of programs, and its gradient by the parameters.
 #[derive(Debug, Default)]
 pub(super) struct Objective {
     reader: Reader,
     writer: Writer,
 }
 
-/// What there is to learn: row n of the words means target n.
+/// The examples: row n of the words means target n.
 pub(super) struct Lessons {
     pub words: Words,
     pub targets: Vec<Target>,
 }
 
 impl Objective {
-    /// What the program of each chosen row costs, in nats; `gradient` is overwritten with the
-    /// gradient of their mean.
-    pub fn evaluate(
+    /// The loss of each chosen row's program, in nats. `gradient` is overwritten with the gradient
+    /// of their mean.
+    pub(super) fn evaluate(
         &mut self,
         layout: Layout,
         parameters: &[f32],

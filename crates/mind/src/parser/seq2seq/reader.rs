@@ -8,7 +8,7 @@ use crate::numerics::{
 };
 use crate::parser::WordTable;
 
-/// Utterances as the network gets them: each distinct word once, with its vector.
+/// Utterances as the network reads them: each distinct word once, with its vector.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Words {
     /// `[distinct × dims]`.
@@ -18,7 +18,7 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub fn new<'u>(
+    pub(super) fn new<'u>(
         settings: &Seq2SeqSettings,
         words: &WordTable,
         utterances: impl IntoIterator<Item = &'u LiftedUtterance>,
@@ -39,7 +39,7 @@ impl Words {
     }
 }
 
-/// A slot is its sort's word; with its fixture's word where lifting kept it.
+/// A slot is read as the word of its sort, and the word of its fixture if lifting kept it.
 fn vector(settings: &Seq2SeqSettings, words: &WordTable, word: &Word) -> Vec<f32> {
     let mut vector = match word {
         Word::Text(text) => words.vector(text),
@@ -57,22 +57,22 @@ fn vector(settings: &Seq2SeqSettings, words: &WordTable, word: &Word) -> Vec<f32
     vector
 }
 
-/// Rows of different lengths, longest first, so that the rows that are still going at a step are the
-/// first ones; all steps lie one after another.
+/// Rows of different lengths, packed step by step. The longest rows come first, so the rows that
+/// have a word at a step are the first ones.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Packing {
-    /// Which row stands at each place.
+    /// The row at each place.
     pub order: Vec<usize>,
-    /// Per step, how many rows are going, and where the step begins.
+    /// Per step, how many rows have a word, and where the step begins.
     pub steps: Vec<(usize, usize)>,
     /// Places of all steps.
     pub total: usize,
 }
 
 impl Packing {
-    pub fn new(lengths: &[usize]) -> Packing {
+    pub(super) fn new(lengths: &[usize]) -> Packing {
         let mut order: Vec<usize> = (0..lengths.len()).collect();
-        // Stable: among equal lengths the order is that of the rows.
+        // The sort is stable: rows of equal length keep their order.
         order.sort_by_key(|&row| std::cmp::Reverse(lengths[row]));
         let longest = lengths.iter().copied().max().unwrap_or(0);
         let mut packing = Packing { order, ..Packing::default() };
@@ -85,7 +85,7 @@ impl Packing {
     }
 }
 
-/// What one direction of the encoder leaves behind.
+/// The results of one direction of the encoder.
 #[derive(Debug, Clone, Default)]
 struct Direction {
     /// Of each distinct word, `[distinct × 4·units]`.
@@ -107,13 +107,19 @@ pub(super) struct Reader {
     rows: Vec<Vec<usize>>,
     /// Where each row begins in `read`.
     pub starts: Vec<usize>,
-    /// What was read: both states at each word, row by row, `[words × 2·units]`.
+    /// Both states at each word, row by row, `[words × 2·units]`.
     pub read: Vec<f32>,
 }
 
 impl Reader {
     /// - `chosen`: the rows of `words` that make the batch; none is empty.
-    pub fn forward(&mut self, layout: Layout, parameters: &[f32], words: &Words, chosen: &[usize]) {
+    pub(super) fn forward(
+        &mut self,
+        layout: Layout,
+        parameters: &[f32],
+        words: &Words,
+        chosen: &[usize],
+    ) {
         self.take(layout, words, chosen);
         let units = layout.units;
         self.read.clear();
@@ -156,7 +162,7 @@ impl Reader {
         self.packing = Packing::new(&lengths);
     }
 
-    /// The word that a direction reads at a step, as a place in what was read.
+    /// The word that a direction reads at a step, as a place in [`Reader::read`].
     fn place(&self, side: usize, step: usize, place: usize) -> usize {
         let row = self.packing.order[place];
         let position = if side == 0 { step } else { self.rows[row].len() - 1 - step };
@@ -223,7 +229,7 @@ impl Reader {
     /// Adds the gradient of the encoder's parameters to `gradient`.
     ///
     /// - `d_read`: the gradient of `read`.
-    pub fn backward(
+    pub(super) fn backward(
         &self,
         layout: Layout,
         parameters: &[f32],
@@ -309,12 +315,12 @@ impl Reader {
 }
 
 impl Reader {
-    /// Where a row begins in what was read, and how many words it has.
-    pub fn extent(&self, row: usize) -> (usize, usize) {
+    /// Where a row begins in [`Reader::read`], and how many words it has.
+    pub(super) fn extent(&self, row: usize) -> (usize, usize) {
         (self.starts[row], self.rows[row].len())
     }
 
-    pub fn extents(&self) -> Vec<(usize, usize)> {
+    pub(super) fn extents(&self) -> Vec<(usize, usize)> {
         (0..self.rows.len()).map(|row| self.extent(row)).collect()
     }
 }

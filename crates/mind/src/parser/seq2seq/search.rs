@@ -19,11 +19,10 @@ struct Draft {
 }
 
 /// The likeliest program that the search finds for an utterance, with its probability among all
-/// programs that the grammar of programs allows. `None` when there is nothing that an operator
-/// could be about.
+/// programs that the grammar of programs allows. None if no operator has an argument here.
 ///
-/// Drafts of equal probability: the one whose earlier draft was likelier, then the choice that the
-/// vocabulary has first.
+/// Among drafts of equal probability, the one whose earlier draft was likelier comes first, then
+/// the one whose choice comes first in the vocabulary.
 ///
 /// - `words`: of this utterance alone.
 pub(super) fn likeliest(
@@ -97,7 +96,7 @@ pub(super) fn likeliest(
     Some((vocabulary.decode(&choices, &sorts), exp(log)))
 }
 
-/// The decoder's state and cells after it was told a token.
+/// The decoder's state and cells after a token.
 fn step(
     layout: Layout,
     parameters: &[f32],

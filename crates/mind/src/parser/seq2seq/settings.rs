@@ -12,19 +12,20 @@ use crate::parser::ranges::{size, within};
 pub struct Seq2SeqSettings {
     /// Units of each of the three LSTMs: the encoder's two directions and the decoder.
     pub units: usize,
-    /// Numbers that the decoder is told its last token by.
+    /// Numbers per token in the input of the decoder.
     pub token: usize,
+    /// How far a step goes.
     pub learning_rate: f32,
-    /// Longer gradients are made this long.
+    /// Gradients longer than this are shortened to it.
     pub clip: f32,
     /// Examples per step.
     pub batch: usize,
-    /// Passes over all examples at most.
+    /// The most passes over all examples.
     pub epochs_max: usize,
     /// Training ends when no example that can be learned costs more than this, in nats for its
     /// whole program.
     pub stop_loss: f32,
-    /// Programs that are followed side by side in search of the likeliest.
+    /// Programs that the search for the likeliest keeps at once.
     pub beam: usize,
     /// The word whose vector stands for a sort; else the sort's own name.
     pub slot_words: BTreeMap<String, String>,
@@ -35,7 +36,7 @@ pub struct Seq2SeqSettings {
 }
 
 impl Default for Seq2SeqSettings {
-    /// Jia and Liang (2016), in small: some dozens of short sentences, not some hundreds.
+    /// Jia and Liang (2016), made smaller: for dozens of short sentences, not hundreds.
     fn default() -> Seq2SeqSettings {
         Seq2SeqSettings {
             units: 32,
@@ -54,7 +55,9 @@ impl Default for Seq2SeqSettings {
 }
 
 impl Seq2SeqSettings {
-    /// - errors: a value that no training could use, by name.
+    /// Checks every value.
+    ///
+    /// - errors: [`TrainFault::Setting`], a value that no training can use.
     pub fn check(&self) -> Result<(), TrainFault> {
         size("units", self.units, 512)?;
         size("token", self.token, 512)?;

@@ -21,7 +21,8 @@ pub(super) fn train(
     if let Some(number) = examples.iter().position(|e| e.utterance.words.is_empty()) {
         return Err(TrainFault::NoWords { number });
     }
-    // What has a slot that was not said cannot be written; nobody can say it either.
+    // A program with a slot that its utterance does not have cannot be written. No utterance can
+    // ask for it either.
     let encoded: Vec<(&Exemplar, _)> = learned(examples, seeds)
         .filter_map(|exemplar| Some((exemplar, vocabulary.encode(exemplar)?)))
         .collect();

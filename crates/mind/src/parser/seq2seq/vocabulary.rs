@@ -4,18 +4,18 @@ use crate::language::{
     Exemplar, LiftedArg, LiftedProgram, LiftedStep, LiftedUtterance, Signature, Symbol, Word,
 };
 
-/// Slots that the decoder tells apart when it is told its last token; it copies any.
+/// How many slots the decoder's input tells apart. It can copy more.
 const SLOTS_TOLD: usize = 4;
 
-/// The tokens of programs. Numbers of those that can be written: operators, then the end, then
-/// constants. A slot is never written, only copied from where it stands in the utterance.
+/// The tokens of programs. Those that can be written have numbers: operators, then the end, then
+/// constants. A slot is never written; it is copied from its place in the utterance.
 #[derive(Debug, Clone)]
 pub(super) struct Vocabulary {
     /// Each operator and the sorts of its arguments.
     operators: Vec<(Symbol, Vec<Symbol>)>,
-    /// What programs name beside slots: types, `<held>`.
+    /// The arguments that are not slots: types, `<held>`.
     constants: Vec<LiftedArg>,
-    /// Steps of the longest program that was shown; none longer is written.
+    /// Steps of the longest program in training. No longer one is written.
     pub steps_max: usize,
 }
 
@@ -38,7 +38,7 @@ pub(super) enum Expected {
 
 impl Vocabulary {
     /// - `exemplars`: whose programs name the constants.
-    pub fn new(signature: &Signature, exemplars: &[&Exemplar]) -> Vocabulary {
+    pub(super) fn new(signature: &Signature, exemplars: &[&Exemplar]) -> Vocabulary {
         let operators = signature.operators.iter();
         let operators = operators.map(|o| (o.name.clone(), o.args.clone())).collect();
         let programs = exemplars.iter().map(|exemplar| &exemplar.program);
@@ -50,21 +50,21 @@ impl Vocabulary {
     }
 
     /// How many tokens can be written.
-    pub fn writes(&self) -> usize {
+    pub(super) fn writes(&self) -> usize {
         self.operators.len() + 1 + self.constants.len()
     }
 
-    /// How many tokens the decoder can be told.
-    pub fn tokens(&self) -> usize {
+    /// How many tokens the decoder's input can have.
+    pub(super) fn tokens(&self) -> usize {
         self.writes() + SLOTS_TOLD
     }
 
-    pub fn end(&self) -> usize {
+    pub(super) fn end(&self) -> usize {
         self.operators.len()
     }
 
-    /// The token that the decoder is told after a choice.
-    pub fn told(&self, choice: Choice) -> usize {
+    /// The input of the decoder after a choice.
+    pub(super) fn told(&self, choice: Choice) -> usize {
         match choice {
             Choice::Write(token) => token,
             Choice::Copy(slot) => self.writes() + slot.min(SLOTS_TOLD - 1),
@@ -75,7 +75,7 @@ impl Vocabulary {
     ///
     /// - returns: `None` for a program that is none of this signature's, or has a slot that the
     ///   utterance has not.
-    pub fn encode(&self, exemplar: &Exemplar) -> Option<Vec<Choice>> {
+    pub(super) fn encode(&self, exemplar: &Exemplar) -> Option<Vec<Choice>> {
         let slots = exemplar.utterance.slots();
         let mut out = Vec::new();
         for step in &exemplar.program.steps {
@@ -104,7 +104,7 @@ impl Vocabulary {
     /// The program that whole choices stand for, the end left out.
     ///
     /// - `sorts`: of the utterance's slots.
-    pub fn decode(&self, choices: &[Choice], sorts: &[Symbol]) -> LiftedProgram {
+    pub(super) fn decode(&self, choices: &[Choice], sorts: &[Symbol]) -> LiftedProgram {
         let mut steps: Vec<LiftedStep> = Vec::new();
         for choice in choices {
             let arg = match *choice {
@@ -126,12 +126,12 @@ impl Vocabulary {
     }
 
     /// What is expected at the beginning, then after each choice.
-    pub fn start(&self) -> Expected {
+    pub(super) fn start(&self) -> Expected {
         Expected::Step { first: true, last: false }
     }
 
     /// - `steps`: operators chosen so far, this choice included.
-    pub fn after(&self, expected: Expected, choice: Choice, steps: usize) -> Expected {
+    pub(super) fn after(&self, expected: Expected, choice: Choice, steps: usize) -> Expected {
         let next = |operator: usize, place: usize| match self.operators[operator].1.len() > place {
             true => Expected::Argument { operator, place },
             false => Expected::Step { first: false, last: steps >= self.steps_max },
@@ -139,7 +139,7 @@ impl Vocabulary {
         match (expected, choice) {
             (Expected::Argument { operator, place }, _) => next(operator, place + 1),
             (Expected::Step { .. }, Choice::Write(token)) if token < self.end() => next(token, 0),
-            // The end; nothing is expected any more.
+            // After the end, nothing is expected.
             (Expected::Step { .. }, _) => expected,
         }
     }
@@ -148,7 +148,7 @@ impl Vocabulary {
     /// all be filled, the end behind a step, a constant or a slot of the argument's sort.
     ///
     /// - `sorts`: of the utterance's slots.
-    pub fn allowed(&self, expected: Expected, sorts: &[Symbol]) -> Vec<Choice> {
+    pub(super) fn allowed(&self, expected: Expected, sorts: &[Symbol]) -> Vec<Choice> {
         match expected {
             Expected::Step { first, last } => {
                 let fills = |sort: &Symbol| !self.constants.is_empty() || sorts.contains(sort);

@@ -7,18 +7,18 @@ use crate::numerics::{
     tanh_all, transpose,
 };
 
-/// A program as it is taught: at each step what is right among what is allowed.
+/// A program to learn: at each step the right choice and the allowed ones.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
     pub choices: Vec<Choice>,
     pub allowed: Vec<Vec<Choice>>,
-    /// Where each slot of the utterance stands.
+    /// The place of each slot in the utterance.
     pub slots: Vec<usize>,
 }
 
 impl Target {
     /// - `choices`: as [`Vocabulary::encode`] gives them; `sorts` and `slots`: of the utterance.
-    pub fn new(
+    pub(super) fn new(
         vocabulary: &Vocabulary,
         choices: Vec<Choice>,
         sorts: &[Symbol],
@@ -36,10 +36,10 @@ impl Target {
     }
 }
 
-/// What was read of a batch, made ready for writing.
+/// The encoder's results for a batch, prepared for the decoder.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sources {
-    /// What states are compared with, `[words × units]`.
+    /// The keys of attention, `[words × units]`.
     pub keys: Vec<f32>,
     /// The decoder's first cells and state, `[rows × units]`.
     pub cells: Vec<f32>,
@@ -50,7 +50,7 @@ pub(super) struct Sources {
 
 impl Sources {
     /// - `lengths`: words of each row of `reader`.
-    pub fn new(
+    pub(super) fn new(
         layout: Layout,
         parameters: &[f32],
         read: &[f32],
@@ -76,7 +76,7 @@ impl Sources {
     }
 }
 
-/// How a state looks at what was read: the scores and shares of each word, and the context.
+/// The attention of a state: the score and the share of each word, and the context.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Look {
     pub scores: Vec<f32>,
@@ -85,7 +85,7 @@ pub(super) struct Look {
 
 impl Look {
     /// - `keys`, `read`: of one utterance; `context`: overwritten, `[2·units]`.
-    pub fn forward(
+    pub(super) fn forward(
         units: usize,
         state: &[f32],
         keys: &[f32],
@@ -124,12 +124,13 @@ pub(super) fn log_probabilities(
     logs
 }
 
-/// The decoder over a batch, told the right tokens, and the way back.
+/// The decoder over a batch with the right tokens as input, and its backward pass.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Writer {
     packing: Packing,
     sources: Sources,
-    /// Packed by step: state and context `[total × 3·units]`, cells before the step `[total × units]`.
+    /// Packed by step: state and context `[total × 3·units]`, cells before the step `[total ×
+    /// units]`.
     seen: Vec<f32>,
     cells: Vec<f32>,
     looks: Vec<Look>,
@@ -145,9 +146,9 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// What each row's program costs, in nats. The gradients of `backward` are those of their sum
+    /// The loss of each row's program, in nats. The gradients of `backward` are those of their sum
     /// times `weight`.
-    pub fn forward(
+    pub(super) fn forward(
         &mut self,
         layout: Layout,
         parameters: &[f32],
@@ -234,7 +235,7 @@ impl Writer {
         losses
     }
 
-    /// Scores of a step, what they cost, and their gradient.
+    /// The scores of a step, their loss and their gradient.
     fn judge(
         &mut self,
         layout: Layout,
@@ -278,9 +279,9 @@ impl Writer {
         }
     }
 
-    /// Adds the gradient of the decoder's parameters to `gradient`, and gives that of what was read,
-    /// `[words × 2·units]`.
-    pub fn backward(
+    /// Adds the gradient of the decoder's parameters to `gradient`, and gives that of what was
+    /// read, `[words × 2·units]`.
+    pub(super) fn backward(
         &self,
         layout: Layout,
         parameters: &[f32],
@@ -373,7 +374,7 @@ impl Writer {
         d_read
     }
 
-    /// The gradient of the matrices that every step used, all steps at once.
+    /// The gradient of the matrices that all steps use.
     fn weights_back(&self, layout: Layout, d_gates: &[f32], gradient: &mut [f32]) {
         let Layout { units, token, writes, .. } = layout;
         let (wide, input, total) = (4 * units, token + 2 * units, self.packing.total);
