@@ -8,5 +8,6 @@ mod feed;
 mod protocol;
 mod quotas;
 mod recorded_through_socket;
+mod refused_messages;
 mod request_ids;
 mod wire;
