@@ -204,6 +204,12 @@ mod tests {
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
         let read = CurveKey::read(&path).unwrap();
         assert_eq!((read.public(), read.secret()), (key.public(), key.secret()));
+        // A ZeroMQ certificate, which other programs read.
+        let text = fs::read_to_string(&path).unwrap();
+        for (name, half) in [("public-key", &key.public().0), ("secret-key", key.secret())] {
+            let line = format!("    {name} = \"{}\"", zmq::z85_encode(half).unwrap());
+            assert!(text.lines().any(|it| it == line), "{name}");
+        }
         for named in [&*z85::show(key.public()), public.to_str().unwrap(), path.to_str().unwrap()] {
             assert_eq!(read_public(named).unwrap(), *key.public());
         }
