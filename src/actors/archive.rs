@@ -1,4 +1,4 @@
-//! What the log holds, for auditors and operators: read apart from the actors, and by turns.
+//! Reads the log for auditors and operators, on a thread of its own. Tenants take turns.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -18,23 +18,28 @@ use crate::limits::{
 use crate::replay;
 use crate::store::{EventLog, ReadError};
 
-/// Reads what is durable. Blocks.
+/// Reads durable records. All its methods block.
 #[derive(Clone)]
-pub struct Reader {
+pub struct ArchiveReader {
     log: Arc<dyn EventLog>,
 }
 
-impl std::fmt::Debug for Reader {
+impl std::fmt::Debug for ArchiveReader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Reader(..)")
+        f.write_str("ArchiveReader(..)")
     }
 }
 
-impl Reader {
-    pub(super) fn new(log: Arc<dyn EventLog>) -> Reader {
-        Reader { log }
+impl ArchiveReader {
+    pub(super) fn new(log: Arc<dyn EventLog>) -> ArchiveReader {
+        ArchiveReader { log }
     }
 
+    /// Where the streams of a tenant end, in the order of their keys.
+    ///
+    /// - `after`: only streams with a greater key.
+    /// - `limit`: streams; the reader gives at most [`HEADS_IN_REPLY_MAX`].
+    /// - errors: the log cannot be read.
     pub fn heads(
         &self,
         tenant: &TenantId,
@@ -54,7 +59,11 @@ impl Reader {
         Ok(Heads { heads, more })
     }
 
-    /// At least one record, if there is one; no more than fit a reply.
+    /// Encrypted records of a stream: at least one, if there is one, and no more than a reply may
+    /// have.
+    ///
+    /// - `limit`: records; the reader gives at most [`RECORDS_IN_REPLY_MAX`].
+    /// - errors: the log cannot be read.
     pub fn sealed(
         &self,
         stream: &StreamId,
@@ -79,7 +88,7 @@ impl Reader {
         Ok(SealedRecords { records, more: false })
     }
 
-    /// As [`Reader::sealed`], opened.
+    /// As [`ArchiveReader::sealed`], decrypted.
     pub fn plain(
         &self,
         stream: &StreamId,
@@ -128,8 +137,8 @@ impl Reader {
     }
 }
 
-/// A thread that answers questions about the log. Those of one tenant wait behind their own, not
-/// others' behind theirs.
+/// A thread that answers questions about the log. Each tenant has its own queue, so the questions
+/// of one tenant do not delay those of another.
 #[derive(Clone)]
 pub(super) struct Archive(Arc<Questions>);
 
@@ -141,22 +150,24 @@ pub(super) struct Question {
 }
 
 struct Questions {
-    waiting: Mutex<Waiting>,
+    queue: Mutex<QuestionQueue>,
     changed: Condvar,
 }
 
-struct Waiting {
+struct QuestionQueue {
     turns: Turns<Question>,
     room: Room,
     closed: bool,
 }
 
 impl Archive {
-    /// - `open`: ends when the thread has let go of the log.
-    pub fn start(reader: Reader, open: Awake) -> std::io::Result<Archive> {
+    /// Starts the thread.
+    ///
+    /// - `open`: dropped when the thread no longer uses the log.
+    pub fn start(reader: ArchiveReader, open: Awake) -> std::io::Result<Archive> {
         let room = Room::new(ARCHIVE_QUEUE_MAX);
-        let waiting = Mutex::new(Waiting { turns: Turns::default(), room, closed: false });
-        let questions = Arc::new(Questions { waiting, changed: Condvar::new() });
+        let queue = Mutex::new(QuestionQueue { turns: Turns::default(), room, closed: false });
+        let questions = Arc::new(Questions { queue, changed: Condvar::new() });
         let serving = questions.clone();
         thread::Builder::new().name("archive".to_owned()).spawn(move || {
             let _open = open;
@@ -168,24 +179,27 @@ impl Archive {
         Ok(Archive(questions))
     }
 
-    /// - errors: the way back, when the tenant has too many here already, or nobody answers.
+    /// Queues a question.
+    ///
+    /// - errors: the question cannot be answered, because the tenant has too many in the queue or
+    ///   the archive is closed. Answer it in another way.
     pub fn ask(&self, question: Question) -> Result<(), AnswerTo> {
-        let mut waiting = self.0.waiting();
-        if waiting.closed || !waiting.room.take(&question.tenant, 1) {
+        let mut queue = self.0.queue();
+        if queue.closed || !queue.room.take(&question.tenant, 1) {
             return Err(question.answer);
         }
         let tenant = question.tenant.clone();
-        waiting.turns.push(&tenant, question);
+        queue.turns.push(&tenant, question);
         self.0.changed.notify_one();
         Ok(())
     }
 
-    /// Answers nobody any more. What waits is told to ask again.
+    /// Answers no more questions. The callers in the queue are told to ask again.
     pub fn close(&self) {
-        let mut waiting = self.0.waiting();
-        waiting.closed = true;
-        let left = std::mem::take(&mut waiting.turns);
-        drop(waiting);
+        let mut queue = self.0.queue();
+        queue.closed = true;
+        let left = std::mem::take(&mut queue.turns);
+        drop(queue);
         self.0.changed.notify_one();
         drop(left);
     }
@@ -193,20 +207,20 @@ impl Archive {
 
 impl Questions {
     fn next(&self) -> Option<Question> {
-        let mut waiting = self.waiting();
+        let mut queue = self.queue();
         loop {
-            if waiting.closed {
+            if queue.closed {
                 return None;
             }
-            if let Some(question) = waiting.turns.pop() {
-                waiting.room.give_back(&question.tenant, 1);
+            if let Some(question) = queue.turns.pop() {
+                queue.room.give_back(&question.tenant, 1);
                 return Some(question);
             }
-            waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+            queue = self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    fn queue(&self) -> MutexGuard<'_, QuestionQueue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

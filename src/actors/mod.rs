@@ -1,5 +1,6 @@
-//! Who is awake: one mailbox for each person, one pool of trainers, one directory for all. What
-//! they decide stands in `seat/` and `directory/`, without actix; the actors carry it out.
+//! The actors: one for each person who is awake, a pool of trainers, and one directory that knows
+//! who is awake. All decisions are in `seat/` and `directory/`, without actix. The actors carry
+//! them out.
 
 mod archive;
 mod awake;
@@ -20,7 +21,7 @@ mod tenant_registry;
 mod trainer;
 mod user;
 
-pub use archive::Reader;
+pub use archive::ArchiveReader;
 pub use clock::wall_clock;
 pub use directory::{
     Directory, DirectoryEffect, DirectoryInput, Letter, NotDelivered, Undelivered,

@@ -7,22 +7,24 @@ use crate::fairness::{Room, Turns};
 use crate::ids::{Seq, StreamId, TenantId};
 use crate::limits::NOTIFICATIONS_WAITING_MAX;
 
-/// What became durable, for whoever publishes it: places in the log, no content. Noting costs the
-/// writer a lock and no I/O. What finds the queue full is counted and left out; nobody waits.
+/// A bounded queue of commit notifications (stream and sequence, no content) for the feed. A writer
+/// takes a lock and does no I/O. If the queue is full, the notification is dropped and counted, and
+/// the writer does not wait.
 #[derive(Clone, Default)]
 pub struct CommitNotifications(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
-    waiting: Mutex<Waiting>,
-    /// Nobody listens until this is set; nothing is kept until then.
+    queue: Mutex<NotificationQueue>,
+    /// Wakes the listener. Notifications are dropped until this is set.
     wake: OnceLock<Box<dyn Fn() + Send + Sync>>,
 }
 
-struct Waiting {
+/// What waits for the listener.
+struct NotificationQueue {
     turns: Turns<CommitNotification>,
     room: Room,
-    /// Records noted for each tenant, the ones left out included.
+    /// Records noted for each tenant, also those whose notification was dropped.
     numbers: BTreeMap<TenantId, u64>,
     left_out: u64,
 }
@@ -30,28 +32,31 @@ struct Waiting {
 /// The records `first` to `last` of a stream are durable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CommitNotification {
+    /// The stream.
     pub stream: StreamId,
+    /// The first of the records.
     pub first: Seq,
+    /// The last of the records.
     pub last: Seq,
-    /// The place of `first` among all records that were noted for this tenant, from 1 on: whoever
-    /// sees a number missing has missed records.
+    /// The number of `first` among all records that were noted for this tenant, from 1. A missing
+    /// number means missed records.
     pub number: u64,
 }
 
-impl Default for Waiting {
-    fn default() -> Waiting {
+impl Default for NotificationQueue {
+    fn default() -> NotificationQueue {
         let room = Room::new(NOTIFICATIONS_WAITING_MAX);
-        Waiting { turns: Turns::default(), room, numbers: BTreeMap::new(), left_out: 0 }
+        NotificationQueue { turns: Turns::default(), room, numbers: BTreeMap::new(), left_out: 0 }
     }
 }
 
 impl CommitNotifications {
-    /// From now on what grows is kept, and `wake` is called for each.
+    /// Keeps notifications from now on, and calls `wake` for each. Only the first call counts.
     pub fn listen(&self, wake: impl Fn() + Send + Sync + 'static) {
         let _ = self.0.wake.set(Box::new(wake));
     }
 
-    /// Must be called after the records are durable, in the order of the stream.
+    /// Notes new records. Call it after they are durable, in the order of the stream.
     pub(super) fn note(&self, stream: &StreamId, durable: &Durable) {
         let Some(wake) = self.0.wake.get() else { return };
         let records = durable.records();
@@ -63,40 +68,40 @@ impl CommitNotifications {
             number,
         };
         {
-            let waiting = &mut *self.waiting();
-            let number = waiting.numbers.entry(stream.tenant.clone()).or_default();
+            let queue = &mut *self.queue();
+            let number = queue.numbers.entry(stream.tenant.clone()).or_default();
             let notification = notification(*number + 1);
             *number += records.len() as u64;
-            if waiting.room.take(&stream.tenant, 1) {
-                waiting.turns.push(&stream.tenant, notification);
+            if queue.room.take(&stream.tenant, 1) {
+                queue.turns.push(&stream.tenant, notification);
             } else {
-                waiting.left_out += records.len() as u64;
+                queue.left_out += records.len() as u64;
             }
         }
         wake();
     }
 
-    /// The next notification; tenants take turns.
+    /// The next notification; none if the queue is empty. Tenants take turns.
     pub fn next(&self) -> Option<CommitNotification> {
-        let mut waiting = self.waiting();
-        let notification = waiting.turns.pop()?;
-        waiting.room.give_back(&notification.stream.tenant, 1);
+        let mut queue = self.queue();
+        let notification = queue.turns.pop()?;
+        queue.room.give_back(&notification.stream.tenant, 1);
         Some(notification)
     }
 
-    /// How many records were noted for each tenant; none while some of them are still to be taken.
+    /// How many records were noted for each tenant; none while the queue is not empty.
     pub fn all_taken(&self) -> Option<BTreeMap<TenantId, u64>> {
-        let waiting = self.waiting();
-        waiting.turns.is_empty().then(|| waiting.numbers.clone())
+        let queue = self.queue();
+        queue.turns.is_empty().then(|| queue.numbers.clone())
     }
 
-    /// Records that found the queue full.
+    /// Records whose notification was dropped, because the queue was full.
     pub fn left_out(&self) -> u64 {
-        self.waiting().left_out
+        self.queue().left_out
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        self.0.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    fn queue(&self) -> MutexGuard<'_, NotificationQueue> {
+        self.0.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

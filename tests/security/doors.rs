@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
 use apprentice::client::{
-    Ask, Client, ClientError, Command, CurveKey, DoorAsk, ErrorCode, Identity, Order, Response,
+    Ask, Client, ClientError, Command, CurveKey, ErrorCode, Identity, Order, Response, ServiceAsk,
     TenantAsk, TenantVerb, fresh_id,
 };
 use apprentice::ids::PublicKey;
@@ -54,7 +54,7 @@ fn not_let_in(client: &Client) {
 }
 
 #[test]
-fn whoever_has_an_admitted_key_talks_and_teaches() {
+fn a_client_with_an_admitted_key_talks_and_teaches() {
     let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
     let ada = connect(&service, &key, "ada");
@@ -171,7 +171,7 @@ fn a_disabled_lab_is_shut_out_and_comes_back_as_it_was() {
 }
 
 #[test]
-fn whoever_knocks_at_the_wrong_door_or_at_a_wrong_service_is_told_so() {
+fn a_client_of_the_wrong_endpoint_or_the_wrong_service_is_told_so() {
     let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
     let locked = service.curve_endpoints()[0].clone();
@@ -214,7 +214,8 @@ fn an_address_that_another_could_take_is_not_answered_to() {
     let socket = stranger(&service, &key);
     socket.set_identity(b"lab-a's robot").unwrap();
     socket.connect(&service.curve_endpoints()[0]).unwrap();
-    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Door(DoorAsk::Hello) };
+    let request =
+        Request { id: fresh_id(), user: user("ada"), ask: Ask::Service(ServiceAsk::Hello) };
     socket.send(encode_request(&request), 0).unwrap();
     assert_eq!(socket.poll(zmq::POLLIN, 30_000).unwrap(), 1, "an answer within 30 s");
     let (id, response) = decode_response(&socket.recv_bytes(0).unwrap()).unwrap();
@@ -225,17 +226,18 @@ fn an_address_that_another_could_take_is_not_answered_to() {
 
 #[test]
 fn a_thousand_denied_handshakes_leave_the_service_serving() {
-    const KNOCKS: u64 = 1_000;
+    const HANDSHAKES: u64 = 1_000;
     let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
     let ada = connect(&service, &key, "ada");
     ada.start(task()).unwrap();
     let unknown = CurveKey::new().unwrap();
-    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Door(DoorAsk::Hello) };
+    let request =
+        Request { id: fresh_id(), user: user("ada"), ask: Ask::Service(ServiceAsk::Hello) };
     let bytes = encode_request(&request);
-    let mut knocked = 0;
-    while service.counts().handshakes_denied < KNOCKS {
-        let wanted = (service.counts().handshakes_denied + 20).min(KNOCKS);
+    let mut connected = 0;
+    while service.counts().handshakes_denied < HANDSHAKES {
+        let wanted = (service.counts().handshakes_denied + 20).min(HANDSHAKES);
         let sockets: Vec<zmq::Socket> = (0..20)
             .map(|_| {
                 let socket = stranger(&service, &unknown);
@@ -244,10 +246,10 @@ fn a_thousand_denied_handshakes_leave_the_service_serving() {
                 socket
             })
             .collect();
-        knocked += sockets.len();
+        connected += sockets.len();
         let end = Instant::now() + BOUND;
         while service.counts().handshakes_denied < wanted {
-            assert!(Instant::now() < end, "after {knocked}: {:?}", service.counts());
+            assert!(Instant::now() < end, "after {connected}: {:?}", service.counts());
             thread::sleep(Duration::from_millis(1));
         }
         // The endpoints serve admitted clients all the time.
@@ -256,7 +258,7 @@ fn a_thousand_denied_handshakes_leave_the_service_serving() {
     }
     connect(&service, &key, "bob").hello().unwrap();
     let counts = service.counts();
-    assert!(counts.handshakes_denied >= KNOCKS, "{counts:?}");
+    assert!(counts.handshakes_denied >= HANDSHAKES, "{counts:?}");
     assert_eq!((counts.unvouched, counts.denied, counts.dropped), (0, 0, 0), "{counts:?}");
     println!("{counts:?}");
     service.stop().unwrap();
@@ -498,7 +500,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     assert!(code == 1 && text.contains("the role operator; yours is gateway"), "{text}");
     let talk = ["talk", "--connect", &endpoint, "--key", &lab, "--server-key", server.trim()];
     let (code, text) = complained(&talk);
-    assert!(code == 1 && text.contains("does not let in your key"), "{text}");
+    assert!(code == 1 && text.contains("does not admit your key"), "{text}");
     service.stop().unwrap();
 
     // And stopped again: the orders had their effect.

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
 use apprentice::client::{
-    ArchiveAsk, Ask, Client, CurveKey, DoorAsk, Follower, Identity, Order, PersonAsk, Query,
-    Response, fresh_id, read_public,
+    ArchiveAsk, Ask, Client, CurveKey, Follower, Identity, Order, PersonAsk, Query, Response,
+    ServiceAsk, fresh_id, read_public,
 };
 use apprentice::ids::{PublicKey, Seq, StreamKey};
 use apprentice::limits::{KEY_CONNECTIONS_MAX, TOPICS_MAX};
@@ -199,7 +199,7 @@ fn eight_connections_that_take_no_answer_cost_bounded_memory_and_nobody_elses_ti
 }
 
 #[test]
-fn a_door_without_keys_is_bounded_in_the_same_way() {
+fn an_endpoint_without_keys_is_bounded_in_the_same_way() {
     let served = Served::start();
     let ada = Client::connect(&served.open, user("ada")).unwrap();
     ada.start(large_stage()).unwrap();
@@ -230,10 +230,10 @@ fn a_subscriber_that_asks_for_everything_is_cut_off_and_the_others_follow_on() {
     let ada = served.connect(&gateway, "ada");
     let mut follower = Follower::sealed(served.connect(&good, "good"), Default::default());
     ada.start(large_stage()).unwrap();
-    let door = served.connect(&bad, "bad");
+    let client = served.connect(&bad, "bad");
     let end = Instant::now() + BOUND;
     let feed = loop {
-        match door.feed().unwrap().sealed {
+        match client.feed().unwrap().sealed {
             Some(endpoint) => break endpoint,
             None => assert!(Instant::now() < end, "no feed within {BOUND:?}"),
         }
@@ -275,7 +275,7 @@ fn bells() -> (Service, CurveKey) {
 }
 
 #[test]
-fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
+fn a_key_has_so_many_connections_and_an_ended_one_makes_room() {
     let (service, key) = bells();
     let (context, identity) = (zmq::Context::new(), lab::identity(&service, &key));
     let connect = || {
@@ -283,7 +283,7 @@ fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
         socket.set_linger(0).unwrap();
         identity.put_on(&socket).unwrap();
         socket.connect(&service.curve_endpoints()[0]).unwrap();
-        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
+        socket.send(request("ada", Ask::Service(ServiceAsk::Hello)), 0).unwrap();
         socket
     };
     let is_answered = |socket: &zmq::Socket, patience: Duration| {
@@ -307,7 +307,7 @@ fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
     sockets.truncate(KEY_CONNECTIONS_MAX - 1);
     assert!(is_answered(&one_more, BOUND), "there is room again");
     for socket in &sockets {
-        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
+        socket.send(request("ada", Ask::Service(ServiceAsk::Hello)), 0).unwrap();
         assert!(is_answered(socket, BOUND), "nobody else was cut off");
     }
 }

@@ -214,21 +214,21 @@ fn an_operator_follows_words_and_an_auditor_of_either_lab_sees_none_of_them() {
     }
 
     // At the service's endpoint as well.
-    let at_the_door = |key: &CurveKey, plain: bool| {
+    let from_the_service = |key: &CurveKey, plain: bool| {
         let client = connect(&service, key, "x");
         match plain {
             true => client.plain_records(stream, Seq::FIRST).map(|read| read.records.len()),
             false => client.records(stream, Seq::FIRST).map(|read| read.records.len()),
         }
     };
-    assert!(at_the_door(&auditor, false).unwrap() >= 10);
-    assert!(at_the_door(&operator, true).unwrap() >= 10);
+    assert!(from_the_service(&auditor, false).unwrap() >= 10);
+    assert!(from_the_service(&operator, true).unwrap() >= 10);
     for key in [&other_auditor, &other_operator] {
-        assert_eq!(at_the_door(key, false), Ok(0), "the same stream of another lab is empty");
+        assert_eq!(from_the_service(key, false), Ok(0), "the same stream of another lab is empty");
         assert!(!heads(&connect(&service, key, "x")).contains_key(&stream));
     }
     for (key, plain) in [(&auditor, true), (&gateway, false), (&gateway, true)] {
-        let denied = at_the_door(key, plain).unwrap_err();
+        let denied = from_the_service(key, plain).unwrap_err();
         assert!(matches!(denied, ClientError::Failed { code: ErrorCode::Denied, .. }), "{denied}");
     }
     assert_eq!(connect(&service, &auditor, "x").feed().unwrap().plain, None);
@@ -279,7 +279,7 @@ fn a_key_that_is_taken_back_hears_nothing_more_and_the_others_go_on() {
 }
 
 #[test]
-fn a_feed_without_a_door_with_keys_is_refused() {
+fn a_feed_without_an_endpoint_with_keys_is_refused() {
     let mut config = toy::config(Data::Memory);
     config.feed = Some(FREE_PORT.to_owned());
     match Service::start(config) {

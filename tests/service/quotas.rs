@@ -8,8 +8,8 @@ use apprentice::actors::{
     ActorSettings, ActorSystem, AnswerTo, Failure, Front, Refusals, wall_clock,
 };
 use apprentice::client::{
-    Ask, Client, ClientError, Command, CurveKey, DoorAsk, OnClash, Order, PersonAsk, Phase, Query,
-    Quota, Response, fresh_id,
+    Ask, Client, ClientError, Command, CurveKey, OnClash, Order, PersonAsk, Phase, Query, Quota,
+    Response, ServiceAsk, fresh_id,
 };
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
 use apprentice::learning::Recipe;
@@ -230,7 +230,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
     for _ in 0..3 {
         send(&front, &full, 0, fresh_id(), Ask::Person(PersonAsk::Wait { seconds: 30 }), &sender);
     }
-    match ask(&front, &full, 1, fresh_id(), Ask::Door(DoorAsk::Hello)) {
+    match ask(&front, &full, 1, fresh_id(), Ask::Service(ServiceAsk::Hello)) {
         Response::QuotaExceeded(over) => {
             assert_eq!((over.quota, over.used, over.limit), (Quota::InFlight, 3, 3));
         }
@@ -244,7 +244,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
         assert!(matches!(waited, Response::Waited(_)), "{waited:?}");
     }
     assert!(matches!(
-        ask(&front, &full, 1, fresh_id(), Ask::Door(DoorAsk::Hello)),
+        ask(&front, &full, 1, fresh_id(), Ask::Service(ServiceAsk::Hello)),
         Response::Hello(_)
     ));
 }

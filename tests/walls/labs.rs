@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use apprentice::client::{
-    ArchiveAsk, Ask, Client, Command, CurveKey, DoorAsk, OnClash, Response, Status, wire,
+    ArchiveAsk, Ask, Client, Command, CurveKey, OnClash, Response, ServiceAsk, Status, wire,
 };
 use apprentice::frontends::Counts;
 use apprentice::ids::{PublicKey, RequestId, StreamId, StreamKey, TenantId};
@@ -55,7 +55,7 @@ impl Service {
     /// Retires a key while its connection is open.
     pub fn make_stale(&self, lab: &Lab, key: &str, wire: &mut Wire) {
         let id = RequestId([0x77; 16]);
-        let (user, ask) = (lab::user("ada"), Ask::Door(DoorAsk::Hello));
+        let (user, ask) = (lab::user("ada"), Ask::Service(ServiceAsk::Hello));
         wire.send(&[wire::encode_request(&wire::Request { id, user, ask })]);
         wire.reply_to(id);
         let key = lab.public(key);

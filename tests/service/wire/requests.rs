@@ -1,7 +1,7 @@
 //! One request for each verb.
 
 use apprentice::client::{
-    ArchiveAsk, Ask, Command, DoorAsk, OnClash, Order, PersonAsk, Query, TenantAsk, TenantVerb,
+    ArchiveAsk, Ask, Command, OnClash, Order, PersonAsk, Query, ServiceAsk, TenantAsk, TenantVerb,
 };
 use apprentice::ids::{TenantId, UserId};
 use apprentice::tenancy::Role;
@@ -30,8 +30,8 @@ pub fn requests() -> Vec<(&'static str, Ask)> {
         ("look", Ask::Person(PersonAsk::Query(Query::Look))),
         ("known", Ask::Person(PersonAsk::Query(Query::Known))),
         ("wait", Ask::Person(PersonAsk::Wait { seconds: 20 })),
-        ("hello", Ask::Door(DoorAsk::Hello)),
-        ("feed", Ask::Door(DoorAsk::Feed)),
+        ("hello", Ask::Service(ServiceAsk::Hello)),
+        ("feed", Ask::Service(ServiceAsk::Feed)),
         ("heads", Ask::Archive(ArchiveAsk::Heads { after: Some(STREAM), limit: 1000 })),
         ("records", Ask::Archive(ArchiveAsk::Sealed { stream: STREAM, from: seq(40), limit: 100 })),
         (
