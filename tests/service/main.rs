@@ -3,7 +3,7 @@
 
 mod actors;
 mod conversation;
-mod embed;
+mod examples;
 mod feed;
 mod protocol;
 mod quotas;
