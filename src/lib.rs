@@ -19,11 +19,13 @@ pub mod world {
 
 pub mod events;
 pub mod evidence;
+// Of it, sessions name the receipt only (`ARCHITECTURE.md`, ADR 24).
+pub mod store;
+
 pub mod session;
 pub mod tenancy;
 
 pub mod replay;
-pub mod store;
 
 pub mod actors;
 pub mod frontends;

@@ -10,7 +10,7 @@ use crate::client::{
     SealedRecords, SealedView,
 };
 use crate::events::Record;
-use crate::fairness::{Room, Turns};
+use crate::fairness::{FairQueue, Room};
 use crate::ids::{Seq, StreamId, StreamKey, TenantId};
 use crate::limits::{
     ARCHIVE_QUEUE_MAX, HEADS_IN_REPLY_MAX, RECORDS_IN_REPLY_BYTES, RECORDS_IN_REPLY_MAX,
@@ -150,12 +150,12 @@ pub(super) struct Question {
 }
 
 struct Questions {
-    queue: Mutex<QuestionQueue>,
+    waiting: Mutex<QuestionQueue>,
     changed: Condvar,
 }
 
 struct QuestionQueue {
-    turns: Turns<Question>,
+    queue: FairQueue<Question>,
     room: Room,
     closed: bool,
 }
@@ -166,8 +166,9 @@ impl Archive {
     /// - `open`: dropped when the thread no longer uses the log.
     pub fn start(reader: ArchiveReader, open: Awake) -> std::io::Result<Archive> {
         let room = Room::new(ARCHIVE_QUEUE_MAX);
-        let queue = Mutex::new(QuestionQueue { turns: Turns::default(), room, closed: false });
-        let questions = Arc::new(Questions { queue, changed: Condvar::new() });
+        let waiting =
+            Mutex::new(QuestionQueue { queue: FairQueue::default(), room, closed: false });
+        let questions = Arc::new(Questions { waiting, changed: Condvar::new() });
         let serving = questions.clone();
         thread::Builder::new().name("archive".to_owned()).spawn(move || {
             let _open = open;
@@ -184,22 +185,22 @@ impl Archive {
     /// - errors: the question cannot be answered, because the tenant has too many in the queue or
     ///   the archive is closed. Answer it in another way.
     pub fn ask(&self, question: Question) -> Result<(), AnswerTo> {
-        let mut queue = self.0.queue();
-        if queue.closed || !queue.room.take(&question.tenant, 1) {
+        let mut waiting = self.0.waiting();
+        if waiting.closed || !waiting.room.take(&question.tenant, 1) {
             return Err(question.answer);
         }
         let tenant = question.tenant.clone();
-        queue.turns.push(&tenant, question);
+        waiting.queue.push(&tenant, question);
         self.0.changed.notify_one();
         Ok(())
     }
 
     /// Answers no more questions. The callers in the queue are told to ask again.
     pub fn close(&self) {
-        let mut queue = self.0.queue();
-        queue.closed = true;
-        let left = std::mem::take(&mut queue.turns);
-        drop(queue);
+        let mut waiting = self.0.waiting();
+        waiting.closed = true;
+        let left = std::mem::take(&mut waiting.queue);
+        drop(waiting);
         self.0.changed.notify_one();
         drop(left);
     }
@@ -207,20 +208,20 @@ impl Archive {
 
 impl Questions {
     fn next(&self) -> Option<Question> {
-        let mut queue = self.queue();
+        let mut waiting = self.waiting();
         loop {
-            if queue.closed {
+            if waiting.closed {
                 return None;
             }
-            if let Some(question) = queue.turns.pop() {
-                queue.room.give_back(&question.tenant, 1);
+            if let Some(question) = waiting.queue.pop() {
+                waiting.room.give_back(&question.tenant, 1);
                 return Some(question);
             }
-            queue = self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner);
+            waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    fn queue(&self) -> MutexGuard<'_, QuestionQueue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    fn waiting(&self) -> MutexGuard<'_, QuestionQueue> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,6 +1,6 @@
 //! The actors: one for each person who is awake, a pool of trainers, and one directory that knows
-//! who is awake. All decisions are in `seat/` and `directory/`, without actix. The actors carry
-//! them out.
+//! who is awake. All decisions are in `seat/`, `directory/` and `registrar/`, without actix. The
+//! actors carry them out.
 
 mod archive;
 mod awake;
@@ -17,7 +17,6 @@ mod seat;
 mod shared;
 mod submit;
 mod system;
-mod tenant_registry;
 mod trainer;
 mod user;
 
@@ -31,8 +30,10 @@ pub use meters::{Refusals, Usage};
 pub use notifications::{CommitNotification, CommitNotifications};
 pub use operator::list_tenants;
 pub use presence::{Attention, Presence};
-pub use registrar::{Erased, Obeyed, Registrar, Signed};
+pub use registrar::{
+    Done, Erased, Moment, Obeyed, OrderError, Registrar, Signed, TenantRegistry, TenantWork,
+    TenantWriter, WriterEffect, WriterInput, fold as fold_tenant, fold_all as fold_tenants,
+};
 pub use seat::{Effect, Input, NewSession, Seat, Timer};
 pub use submit::{AnswerTo, Submit};
 pub use system::{ActorSettings, ActorSystem, ActorsError, Front, NotTaken, Wakings};
-pub use tenant_registry::{OrderError, TenantRegistry, fold as fold_tenant};

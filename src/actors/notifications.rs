@@ -2,10 +2,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use crate::events::Durable;
-use crate::fairness::{Room, Turns};
+use crate::fairness::{FairQueue, Room};
 use crate::ids::{Seq, StreamId, TenantId};
 use crate::limits::NOTIFICATIONS_WAITING_MAX;
+use crate::store::Durable;
 
 /// A bounded queue of commit notifications (stream and sequence, no content) for the feed. A writer
 /// takes a lock and does no I/O. If the queue is full, the notification is dropped and counted, and
@@ -15,14 +15,14 @@ pub struct CommitNotifications(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
-    queue: Mutex<NotificationQueue>,
+    waiting: Mutex<NotificationQueue>,
     /// Wakes the listener. Notifications are dropped until this is set.
     wake: OnceLock<Box<dyn Fn() + Send + Sync>>,
 }
 
 /// What waits for the listener.
 struct NotificationQueue {
-    turns: Turns<CommitNotification>,
+    queue: FairQueue<CommitNotification>,
     room: Room,
     /// Records noted for each tenant, also those whose notification was dropped.
     numbers: BTreeMap<TenantId, u64>,
@@ -46,7 +46,12 @@ pub struct CommitNotification {
 impl Default for NotificationQueue {
     fn default() -> NotificationQueue {
         let room = Room::new(NOTIFICATIONS_WAITING_MAX);
-        NotificationQueue { turns: Turns::default(), room, numbers: BTreeMap::new(), left_out: 0 }
+        NotificationQueue {
+            queue: FairQueue::default(),
+            room,
+            numbers: BTreeMap::new(),
+            left_out: 0,
+        }
     }
 }
 
@@ -68,14 +73,14 @@ impl CommitNotifications {
             number,
         };
         {
-            let queue = &mut *self.queue();
-            let number = queue.numbers.entry(stream.tenant.clone()).or_default();
+            let waiting = &mut *self.waiting();
+            let number = waiting.numbers.entry(stream.tenant.clone()).or_default();
             let notification = notification(*number + 1);
             *number += records.len() as u64;
-            if queue.room.take(&stream.tenant, 1) {
-                queue.turns.push(&stream.tenant, notification);
+            if waiting.room.take(&stream.tenant, 1) {
+                waiting.queue.push(&stream.tenant, notification);
             } else {
-                queue.left_out += records.len() as u64;
+                waiting.left_out += records.len() as u64;
             }
         }
         wake();
@@ -83,25 +88,25 @@ impl CommitNotifications {
 
     /// The next notification; none if the queue is empty. Tenants take turns.
     pub fn next(&self) -> Option<CommitNotification> {
-        let mut queue = self.queue();
-        let notification = queue.turns.pop()?;
-        queue.room.give_back(&notification.stream.tenant, 1);
+        let mut waiting = self.waiting();
+        let notification = waiting.queue.pop()?;
+        waiting.room.give_back(&notification.stream.tenant, 1);
         Some(notification)
     }
 
     /// How many records were noted for each tenant; none while the queue is not empty.
     pub fn all_taken(&self) -> Option<BTreeMap<TenantId, u64>> {
-        let queue = self.queue();
-        queue.turns.is_empty().then(|| queue.numbers.clone())
+        let waiting = self.waiting();
+        waiting.queue.is_empty().then(|| waiting.numbers.clone())
     }
 
     /// Records whose notification was dropped, because the queue was full.
     pub fn left_out(&self) -> u64 {
-        self.queue().left_out
+        self.waiting().left_out
     }
 
-    fn queue(&self) -> MutexGuard<'_, NotificationQueue> {
-        self.0.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    fn waiting(&self) -> MutexGuard<'_, NotificationQueue> {
+        self.0.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

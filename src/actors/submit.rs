@@ -5,7 +5,8 @@ use actix::Message;
 use super::meters::InFlight;
 use super::presence::Attention;
 use crate::client::{PersonAsk, Response};
-use crate::ids::{RequestId, TenantId, UserId};
+use crate::ids::{RequestId, StreamId, TenantId, UserId};
+use crate::invariants::Invariant;
 
 /// One request for a person.
 #[derive(Debug, Message)]
@@ -22,6 +23,14 @@ pub struct Submit {
     pub ask: PersonAsk,
     /// Where the answer goes.
     pub answer: AnswerTo,
+}
+
+impl Submit {
+    /// - panics: when it came from another tenant than the one of `stream`.
+    pub(super) fn must_be_for(&self, stream: &StreamId) {
+        let law = Invariant::TenantWall;
+        assert_eq!(self.tenant, stream.tenant, "{law}: a request is for its own tenant's people");
+    }
 }
 
 /// Sends the answer to the caller, exactly once. If it is dropped without an answer, because an
@@ -51,9 +60,9 @@ impl AnswerTo {
         // place of this one. The actor still ends its present message before it goes to sleep.
         self.awake = None;
         self.in_flight = None;
-        if let Some(way) = self.way.take() {
-            way(response);
-        }
+        let law = Invariant::AnsweredOnce;
+        let way = self.way.take().unwrap_or_else(|| panic!("{law}: nobody waits for this answer"));
+        way(response);
     }
 
     pub(super) fn let_in(&mut self, in_flight: InFlight) {
@@ -85,6 +94,7 @@ mod tests {
     use std::sync::mpsc;
 
     use super::*;
+    use crate::client::Query;
 
     #[test]
     fn a_dropped_request_is_answered_with_busy() {
@@ -101,5 +111,27 @@ mod tests {
             .send(Response::Known(Vec::new()));
         assert_eq!(receiver.recv().unwrap(), Response::Known(Vec::new()));
         assert!(receiver.recv().is_err(), "one answer and no more");
+    }
+
+    #[test]
+    #[should_panic(expected = "AnsweredOnce")]
+    fn a_second_answer_has_no_way() {
+        let mut answer = AnswerTo::new(drop);
+        answer.way = None;
+        answer.send(Response::Known(Vec::new()));
+    }
+
+    #[test]
+    #[should_panic(expected = "TenantWall")]
+    fn a_request_that_reaches_another_tenants_seat_is_a_defect() {
+        let [here, there] = ["here", "there"].map(|name| TenantId::new(name).unwrap());
+        let submit = Submit {
+            tenant: here,
+            user: UserId::new("ada").unwrap(),
+            request: RequestId([1; 16]),
+            ask: PersonAsk::Query(Query::Status),
+            answer: AnswerTo::new(drop),
+        };
+        submit.must_be_for(&StreamId::of_tenant(&there));
     }
 }

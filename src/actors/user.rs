@@ -71,8 +71,8 @@ impl<D: Domain> UserActor<D> {
             Effect::Append { after, batch } => {
                 return Outcome::Pending(shared.log().append(stream, after, batch));
             }
-            Effect::ReadBack { first, last } => {
-                let records = replay::read_back(shared.log(), stream, first, last);
+            Effect::ReadBack { request, first, last } => {
+                let records = replay::read_back(shared.log(), stream, request, (first, last));
                 return Outcome::Known(Input::ReadBack(records));
             }
             Effect::FindMind(digest) => {
@@ -143,6 +143,7 @@ impl<D: Domain> Handler<Submit> for UserActor<D> {
     type Result = AtomicResponse<Self, ()>;
 
     fn handle(&mut self, submit: Submit, ctx: &mut Context<Self>) -> Self::Result {
+        submit.must_be_for(&self.waking.stream);
         let Submit { request, ask, answer: caller, .. } = submit;
         let (at, fresh) = (self.shared.now(), shared::fresh_request());
         AtomicResponse::new(self.step(Input::Asked { ask, request, caller, at, fresh }, ctx))

@@ -8,6 +8,7 @@ use super::{
     Event, EventKind, KeyAdmitted, KeyRetired, PersonErased, QuotasSet, SegmentClosed,
     TenantDisabled, TenantEnabled, TenantOpened, upcast,
 };
+use crate::invariants::Invariant;
 
 /// Why a record's body is no event this binary can read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -16,7 +17,7 @@ pub enum DecodeError {
     UnknownKind { kind: u16 },
     #[error("{kind:?} version {version} is unknown to this version of apprentice; use a newer one")]
     UnknownVersion { kind: EventKind, version: u16 },
-    #[error("the body of a {kind:?} event does not decode: {reason}")]
+    #[error("the body of a {kind:?} event does not decode: {reason} ({})", Invariant::OldLogsOpen)]
     Body { kind: EventKind, reason: String },
 }
 
@@ -79,7 +80,7 @@ pub(super) fn unpack<T: DeserializeOwned>(kind: EventKind, body: &[u8]) -> Resul
     let wrong = |reason: String| DecodeError::Body { kind, reason };
     // Of a slice, not of a reader: that copies every text twice.
     let mut decoder = rmp_serde::Deserializer::from_read_ref(body);
-    // A scene file of nested tables must not overflow the stack of whoever reads it.
+    // A scene file of nested tables must not overflow the stack of its reader.
     decoder.set_max_depth(64);
     let event = T::deserialize(&mut decoder).map_err(|error| wrong(error.to_string()))?;
     // A slice's decoder does not show what is left; at the end there is no next value to read.

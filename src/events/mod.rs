@@ -2,7 +2,6 @@
 
 mod codec;
 mod event;
-mod receipt;
 mod record;
 mod tenant;
 mod upcast;
@@ -17,7 +16,6 @@ pub use event::{
     Interpreted, LessonForgotten, RetrainCompleted, RetrainFailed, RetrainScheduled, SessionClosed,
     SessionOpened,
 };
-pub use receipt::Durable;
 pub use record::{Batch, Head, Record, Times};
 pub use tenant::{
     KeyAdmitted, KeyRetired, Overlap, QuotasSet, SegmentClosed, TenantDisabled, TenantEnabled,

@@ -1,3 +1,5 @@
+use serde::{Deserialize, Serialize};
+
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 
 use super::Event;
@@ -12,7 +14,7 @@ pub struct Batch {
 
 /// Where a stream ends: the number and the digest of its last record. Sequence 0 and
 /// [`Digest::ZERO`] for a stream that does not exist yet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Head {
     pub seq: u64,
     pub digest: Digest,

@@ -23,7 +23,7 @@ pub enum TenantEvent {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TenantOpened {}
 
-/// From now on whoever holds `key` comes in as this tenant.
+/// From now on the holder of `key` is authenticated as this tenant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyAdmitted {
     pub key: PublicKey,
@@ -54,7 +54,7 @@ pub enum Overlap {
     Former { valid_until: Timestamp },
 }
 
-/// Nobody comes in as this tenant any more.
+/// No key is authenticated as this tenant any more.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TenantDisabled {
     pub reason: String,

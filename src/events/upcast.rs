@@ -189,6 +189,7 @@ mod tests {
                 for body in [&b"\x80"[..], b"", b"\xff", b"\xc0\xc0"] {
                     let wrong = decode(number, version, body).unwrap_err();
                     assert!(matches!(wrong, DecodeError::Body { .. }), "{wrong}");
+                    assert!(wrong.to_string().contains("OldLogsOpen"), "{wrong}");
                 }
             }
         }

@@ -65,7 +65,7 @@ impl VerifierKey {
 
     /// The text of `note`, when this key signed it.
     ///
-    /// Signatures by other keys are passed over: whoever added them is known to somebody else.
+    /// Signatures by other keys are ignored: they are for other readers.
     ///
     /// - errors: [`NoteError`]; never panics, whatever the note.
     pub fn open<'n>(&self, note: &'n str) -> Result<&'n str, NoteError> {

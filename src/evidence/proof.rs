@@ -42,7 +42,7 @@ pub struct Inclusion {
     pub tree_path: Vec<TreeHash>,
 }
 
-/// What the record's commitment is over. Whoever has it can read the record, and no other.
+/// What the record's commitment is over. With it one can read this record, and no other.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Revealed {
     pub salt: [u8; 32],

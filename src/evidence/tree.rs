@@ -105,7 +105,7 @@ impl Tree<'_> {
                 known = false;
             }
         }
-        // Whoever checks knows the root of the old tree, but no other subtree of it.
+        // The verifier knows the root of the old tree, but no other subtree of it.
         if !known {
             path.push(Tree(leaves).root());
         }

@@ -1,4 +1,4 @@
-//! The whole log held against what this binary computes from it.
+//! Compares the whole log with what this binary computes from it.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,7 +11,7 @@ use crate::ids::{Digest, StreamId, StreamKey, TenantId, UserId};
 use crate::store::{ReadError, Store};
 use crate::world::Domain;
 
-/// What an audit does beside reading, checking and folding every record.
+/// What an audit does besides reading, checking and folding every record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Scrutiny {
     /// Decide every recorded command again, with the mind of its moment.
@@ -58,7 +58,7 @@ pub struct Counts {
     pub utterances: u64,
     /// Records whose time was held, so that it is not what the wall clock read.
     pub held_times: u64,
-    /// Closed segments that were held against their records.
+    /// Closed segments that were compared with their records.
     pub segments: u64,
     /// Commands that were decided again, utterances among them.
     pub reproposed: u64,
@@ -112,7 +112,7 @@ impl Counts {
     }
 }
 
-/// Whoever watches an audit.
+/// What is told of the progress of an audit.
 pub trait Progress: Sync {
     /// So many records are to be checked in all.
     fn expect(&self, _records: u64) {}
@@ -120,7 +120,7 @@ pub trait Progress: Sync {
     fn advance(&self, _records: u64) {}
 }
 
-/// Nobody watches.
+/// Ignores the progress.
 impl Progress for () {}
 
 /// The streams of one tenant, or of all.

@@ -18,7 +18,7 @@ use crate::store::{Found, ReadError, Store};
 use crate::tenancy::Registry;
 use crate::world::Domain;
 
-/// Records between two calls of whoever watches.
+/// Records between two reports of progress.
 const PROGRESS_EVERY: u64 = 256;
 
 type Trained = Result<Arc<Mind>, String>;

@@ -1,4 +1,4 @@
-//! What was recorded and what is computed today, held against each other field by field.
+//! Compares what was recorded with what is computed today, field by field.
 
 use serde::Serialize;
 use serde_json::Value;

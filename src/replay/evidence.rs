@@ -3,11 +3,11 @@
 
 use crate::events::{EventKind, Header, SegmentClosed};
 use crate::evidence::{
-    Checkpoint, CheckpointError, Consistency, Inclusion, KeyNameError, NoteSigner, Proof, Revealed,
-    Segment, Tree, TreeHash,
+    self, Checkpoint, CheckpointError, Consistency, Inclusion, KeyNameError, NoteSigner, Proof,
+    Revealed, Segment, Tree, TreeHash,
 };
-use crate::ids::{Digest, Seq, StreamId, TenantId};
-use crate::store::{EventLog, FeedError, KeyError, ReadError, Store};
+use crate::ids::{Digest, Seq, Signature, StreamId, TenantId};
+use crate::store::{EventLog, FeedError, KeyError, Keys, ReadError, Store};
 use crate::tenancy::Registry;
 
 /// The name of a service that was given none.
@@ -174,6 +174,39 @@ pub fn newest_checkpoint(
         return Err(CheckpointsError::Forked { signed });
     }
     Ok(Some((note, checkpoint)))
+}
+
+/// Signs the tree of a tenant, unless its newest checkpoint says the same, and keeps the checkpoint
+/// with the others.
+///
+/// - returns: the signed note.
+/// - errors: the tree does not continue the newest checkpoint, too: such a log is not signed.
+pub fn keep_checkpoint(
+    store: &Store,
+    tenant: &TenantId,
+    registry: &Registry,
+) -> Result<String, CheckpointsError> {
+    let leaves = leaves_of(registry);
+    let size = leaves.len() as u64;
+    if let Some((note, newest)) = newest_checkpoint(store, tenant, registry)?
+        && newest.size == size
+    {
+        return Ok(note);
+    }
+    let signer = signer_of(store, tenant)?;
+    let origin = signer.name().to_owned();
+    let note = Checkpoint { origin, size, root: Tree(&leaves).root() }.sign(&signer);
+    store.checkpoints.append(tenant, &note)?;
+    Ok(note)
+}
+
+/// Signs what a tenant states.
+pub fn sign_statement(
+    keys: &Keys,
+    tenant: &TenantId,
+    statement: &[u8],
+) -> Result<Signature, KeyError> {
+    Ok(evidence::sign(&*keys.signing_secret(tenant)?, statement))
 }
 
 /// Why a proof cannot be made.

@@ -9,7 +9,7 @@ use crate::learning::Mind;
 use crate::limits::MINDS_IN_MEMORY_MAX;
 
 /// Minds in memory, by content, so that equal lesson lists cost one training. Never shared between
-/// tenants, except base minds, which hold nobody's words: keep those yourself and `put` them for
+/// tenants, except base minds, which hold no user's words: keep those yourself and `put` them for
 /// each tenant. Also counts what rebuilding cost.
 #[derive(Debug, Default)]
 pub struct Minds {

@@ -16,7 +16,8 @@ pub use audit::{AuditReport, Counts, Progress, Scrutiny, StreamReport, audit, st
 pub use difference::{Difference, body};
 pub use evidence::{
     CheckpointsError, ORIGIN, ProveError, SegmentError, Through, Wanted, check_segment,
-    due_segments, leaf_of, leaves_of, newest_checkpoint, prove, signer_of,
+    due_segments, keep_checkpoint, leaf_of, leaves_of, newest_checkpoint, prove, sign_statement,
+    signer_of,
 };
 pub use minds::{Minds, Work};
 pub use origins::{keep_mind, mind_origin, state_origin};

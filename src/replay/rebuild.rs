@@ -2,7 +2,8 @@ use std::sync::Arc;
 
 use super::{Minds, origins};
 use crate::events::{Head, Record};
-use crate::ids::{Digest, Seq, StreamId};
+use crate::ids::{Digest, RequestId, Seq, StreamId};
+use crate::invariants::Invariant;
 use crate::learning::{self, Mind, Recipe, RecipeError};
 use crate::session::{Divergence, Session, State};
 use crate::store::{EventLog, Found, ReadError, Store};
@@ -104,7 +105,11 @@ fn resume<D: Domain>(
             unreadable = Some(error);
             false
         });
-        let fits = stands && state.head.seq == head.seq && state.opened.is_some();
+        if state.head != head {
+            let law = Invariant::FoldAgrees;
+            tracing::error!(%stream, %law, "a snapshot is of another record than it says");
+        }
+        let fits = stands && state.head == head && state.opened.is_some();
         let session = fits.then(|| Session::resume(domain.clone(), state))?;
         (session.recipe().digest() == recipe).then_some(session)
     };
@@ -157,7 +162,7 @@ fn equip<D: Domain>(
 
 /// The mind that the state names: from memory, from its kept bytes, or trained again.
 ///
-/// Kept bytes of other code are not taken at their word but trained again. Should this code train
+/// Kept bytes of other code are not trusted: the mind is trained again. Should this code train
 /// them differently they are used after all: they are what the log names. (Counted in
 /// [`Minds::work`].)
 ///
@@ -211,21 +216,27 @@ pub fn mind_of<D: Domain>(
     Ok(mind)
 }
 
-/// The records `first` to `last` of a stream, for answering a request again.
+/// The records `first` to `last` of a stream, for answering `request` again.
 ///
-/// - errors: a sentence, when they cannot be read or some are missing.
+/// - errors: a sentence, when they cannot be read, some are missing, or another request led to them.
 pub fn read_back(
     log: &dyn EventLog,
     stream: &StreamId,
-    first: Seq,
-    last: Seq,
+    request: RequestId,
+    (first, last): (Seq, Seq),
 ) -> Result<Vec<Record>, String> {
     let wanted = (last.get() - first.get() + 1) as usize;
     let records = log.read(stream, first).map_err(|error| error.to_string())?;
     let records: Vec<Record> =
         records.take(wanted).collect::<Result<_, _>>().map_err(|error| error.to_string())?;
-    match records.len() == wanted {
+    if records.len() != wanted {
+        return Err(format!("records {first} to {last} of {stream} are missing"));
+    }
+    match records.iter().all(|record| record.request == request) {
         true => Ok(records),
-        false => Err(format!("records {first} to {last} of {stream} are missing")),
+        false => Err(format!(
+            "records {first} to {last} of {stream} are of another request ({})",
+            Invariant::ExactlyOnce
+        )),
     }
 }

@@ -4,13 +4,14 @@
 
 use std::sync::Arc;
 
-use super::state::{Action, Episode, LiveLesson, Opened, State, Training, Unexplained};
+use super::state::{Action, Episode, LiveLesson, Opened, State, Unexplained};
 use crate::client::Phase;
 use crate::events::{
     DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, Head, Interpreted, Record,
     RetrainCompleted, SessionOpened,
 };
 use crate::ids::Seq;
+use crate::invariants::Invariant;
 use crate::language::{Outcome, Program};
 use crate::learning::Lesson;
 use crate::world::Domain;
@@ -25,6 +26,16 @@ pub struct Divergence {
     pub recomputed: String,
 }
 
+/// The field of the scene that a program leaves behind.
+const SCENE: &str = "scene digest";
+
+impl Divergence {
+    /// The law that was broken, where it has a name.
+    pub fn law(&self) -> Option<Invariant> {
+        (self.field == SCENE).then_some(Invariant::SceneAgrees)
+    }
+}
+
 /// Applies one record to the state.
 ///
 /// - errors: [`Divergence`]; the state is then not to be used any more.
@@ -37,13 +48,13 @@ pub fn apply<D: Domain>(
     agree(seq, "sequence number", seq.get(), state.head.seq + 1)?;
     agree(seq, "predecessor", record.prev, state.head.digest)?;
     apply_event(domain, state, seq, &record.event)?;
-    state.head = Head { seq: seq.get(), digest: record.digest }.into();
+    state.head = Head { seq: seq.get(), digest: record.digest };
     state.last_at = record.at;
     state.requests.note(record.request, seq);
     Ok(())
 }
 
-/// Applies an event as the record `seq`, which nobody need have recorded yet: all of [`apply`] but
+/// Applies an event as the record `seq`, which need not be recorded yet: all of [`apply`] but
 /// the place in the chain, the time and the request.
 ///
 /// - errors: [`Divergence`]; the state is then not to be used any more.
@@ -68,10 +79,9 @@ pub(super) fn apply_event<D: Domain>(
         }
         Event::LessonForgotten(event) => forget(state, seq, event.lesson)?,
         Event::RetrainScheduled(event) => {
-            let training = Training { recipe: event.recipe, lessons: event.lessons.clone() };
             let live: Vec<Seq> = state.lessons.iter().map(|live| live.seq).collect();
             agree(seq, "live lessons", seqs(&event.lessons), seqs(&live))?;
-            state.training = Some(training);
+            state.training = Some(event.clone());
             state.phase = Phase::Learning;
         }
         Event::RetrainCompleted(event) => complete(state, seq, event)?,
@@ -122,7 +132,7 @@ fn start<D: Domain>(
     };
     let scene: D::Scene = event.scene.decode().map_err(|reason| unreadable("scene", reason))?;
     let task: D::Task = event.task.decode().map_err(|reason| unreadable("task", reason))?;
-    agree(seq, "scene digest", event.scene_digest, domain.digest(&scene))?;
+    agree(seq, SCENE, event.scene_digest, domain.digest(&scene))?;
     state.episode = Some(Episode {
         scene: Arc::new(scene),
         task: Arc::new(task),
@@ -193,7 +203,7 @@ fn interpret<D: Domain>(
     if event.answer.mentioned.is_some() {
         episode.mentioned = event.answer.mentioned.clone();
     }
-    agree(seq, "scene digest", event.scene_after, domain.digest(&episode.scene))
+    agree(seq, SCENE, event.scene_after, domain.digest(&episode.scene))
 }
 
 fn end<S, T>(state: &mut State<S, T>, seq: Seq, event: &EpisodeEnded) -> Result<(), Divergence> {

@@ -38,7 +38,7 @@ pub enum Command {
     Forget {
         lesson: Seq,
     },
-    /// Withdraw for good. The reason may be empty: nobody owes one.
+    /// Withdraw for good. The reason may be empty.
     Close {
         reason: String,
     },

@@ -38,7 +38,7 @@ impl From<Rejection> for Refusal {
 ///
 /// An event enters through [`Draft::add`] alone, and what one event says of those before it is
 /// read from the state that they led to. So nothing is proposed that the fold refuses: a record
-/// that no fold accepts would shut its person out for ever.
+/// that no fold accepts would lock its user out.
 struct Draft<'a, D: Domain> {
     session: &'a Session<D>,
     state: State<D::Scene, D::Task>,

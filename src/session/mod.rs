@@ -24,10 +24,11 @@ pub use reply::reply_of;
 pub use state::{LiveLesson, State};
 
 use self::decide::Refusal;
-use crate::events::{Batch, Durable, Head, Record};
+use crate::events::{Batch, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::invariants::Invariant;
 use crate::learning::{Lesson, Mind, Recipe};
+use crate::store::Durable;
 use crate::world::Domain;
 
 /// One person's session: a state that only records change, and the mind that answers.
@@ -170,13 +171,18 @@ impl<D: Domain> Session<D> {
 
     /// Work that is due: re-asked after every settle and every activation, so that a scheduled
     /// training is never forgotten (invariant `NoLostWork`).
+    ///
+    /// - panics: when the state has lost a lesson of it.
     pub fn outstanding(&self) -> Option<Outstanding<D>> {
         let training = self.state.training.as_ref()?;
         let recipe = self.recipe.clone()?;
-        Some(Outstanding::Retrain { recipe, lessons: self.lessons_of(&training.lessons) })
+        let lessons = self.lessons_of(&training.lessons);
+        let (law, due) = (Invariant::NoLostWork, training.lessons.len());
+        assert_eq!(lessons.len(), due, "{law}: a scheduled training has all its lessons");
+        Some(Outstanding::Retrain { recipe, lessons })
     }
 
-    /// The lessons that the present mind was trained on, for whoever must train it again.
+    /// The lessons that the present mind was trained on, for training it again.
     pub fn trained_lessons(&self) -> Vec<Lesson<D::Scene, D::Task>> {
         self.lessons_of(&self.state.trained)
     }
@@ -196,7 +202,7 @@ impl<D: Domain> Session<D> {
     }
 
     pub fn head(&self) -> Head {
-        self.state.head.into()
+        self.state.head
     }
 
     pub fn phase(&self) -> Phase {

@@ -1,7 +1,7 @@
 //! A request id that comes again: what it was used for, and the reply to it.
 //!
 //! A record names its request and holds no command. So the command is read out of the events that
-//! it led to: that needs nothing beside the log, and holds for records of every version.
+//! it led to: that needs nothing but the log, and holds for records of every version.
 
 use super::decide;
 use super::{Command, Rejection, Session, reply_of};

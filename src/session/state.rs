@@ -4,7 +4,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::client::Phase;
-use crate::events::Head;
+use crate::events::{Head, RetrainScheduled};
 use crate::ids::{Digest, RequestId, Seq, Timestamp, UserId};
 use crate::language::{Step, Symbol, Utterance};
 use crate::learning::Lesson;
@@ -16,7 +16,7 @@ use crate::limits::REQUEST_RING;
 /// What grows with a history stands behind `Arc`s: each command is folded into a copy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State<S, T> {
-    pub head: HeadFields,
+    pub head: Head,
     pub last_at: Timestamp,
     pub phase: Phase,
     pub opened: Option<Arc<Opened>>,
@@ -33,27 +33,8 @@ pub struct State<S, T> {
     /// The lessons that mind was trained on.
     pub trained: Vec<Seq>,
     /// A training that is scheduled and neither completed nor failed.
-    pub training: Option<Training>,
+    pub training: Option<RetrainScheduled>,
     pub requests: RequestRing,
-}
-
-/// [`Head`] in a form that can be stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HeadFields {
-    pub seq: u64,
-    pub digest: Digest,
-}
-
-impl From<Head> for HeadFields {
-    fn from(head: Head) -> HeadFields {
-        HeadFields { seq: head.seq, digest: head.digest }
-    }
-}
-
-impl From<HeadFields> for Head {
-    fn from(head: HeadFields) -> Head {
-        Head { seq: head.seq, digest: head.digest }
-    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -117,16 +98,10 @@ pub struct LiveLesson<S, T> {
     pub lesson: Lesson<S, T>,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Training {
-    pub recipe: Digest,
-    pub lessons: Vec<Seq>,
-}
-
 impl<S, T> Default for State<S, T> {
     fn default() -> Self {
         State {
-            head: Head::EMPTY.into(),
+            head: Head::EMPTY,
             last_at: Timestamp::default(),
             phase: Phase::Idle,
             opened: None,

@@ -1,12 +1,18 @@
 //! What every backend checks in the same way.
 
-use super::{AppendError, DataKey, KeyError, Keys, ReadError};
 use crate::events::Head;
 use crate::ids::StreamId;
 use crate::limits::KEY_FILE_BYTES;
+use crate::store::log::{AppendError, ReadError};
+use crate::store::sealing::keys::{KeyError, Keys};
+use crate::store::sealing::seal::DataKey;
 
 /// The expected-head check. (Invariant `SingleWriter`.)
-pub(super) fn head(stream: &StreamId, after: Head, found: Head) -> Result<(), AppendError> {
+pub(in crate::store) fn head(
+    stream: &StreamId,
+    after: Head,
+    found: Head,
+) -> Result<(), AppendError> {
     if after == found {
         return Ok(());
     }
@@ -15,7 +21,7 @@ pub(super) fn head(stream: &StreamId, after: Head, found: Head) -> Result<(), Ap
 }
 
 /// The key to seal with; a new stream gets a new one.
-pub(super) fn key_to_append(
+pub(in crate::store) fn key_to_append(
     keys: &Keys,
     stream: &StreamId,
     head: Head,
@@ -34,12 +40,12 @@ pub(super) fn key_to_append(
 }
 
 /// What the first record of a stream adds to its lab's bytes for the key that comes with it.
-pub(super) fn key_bytes(head: Head) -> u64 {
+pub(in crate::store) fn key_bytes(head: Head) -> u64 {
     if head == Head::EMPTY { KEY_FILE_BYTES } else { 0 }
 }
 
 /// The key to read with.
-pub(super) fn key_to_read(keys: &Keys, stream: &StreamId) -> Result<DataKey, ReadError> {
+pub(in crate::store) fn key_to_read(keys: &Keys, stream: &StreamId) -> Result<DataKey, ReadError> {
     keys.user_key(stream).map_err(|error| match error {
         KeyError::Erased { .. } => ReadError::Erased,
         other => ReadError::Store { reason: other.to_string() },

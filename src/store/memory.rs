@@ -1,11 +1,12 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, RwLock};
 
-use super::log::{Pending, ReadError, SealedRecords};
-use super::sealing::before;
-use super::{AppendError, Draft, EventLog, Keys, Walk, checks};
-use crate::events::{Batch, Durable, Head, Header, Record};
+use crate::events::{Batch, Head, Header, Record};
 use crate::ids::{Seq, StreamId, StreamKey, TenantId, WithinTenant};
+use crate::store::checks;
+use crate::store::log::{AppendError, Durable, EventLog, Pending, ReadError, SealedRecords};
+use crate::store::sealing::keys::Keys;
+use crate::store::sealing::seal::{Draft, Walk, before};
 
 /// The log without a disk: the same bytes, the same checks, and its promises are kept at once.
 ///

@@ -1,51 +1,44 @@
 //! Where bytes outlive processes: the ports for durable things, and their adapters.
+//!
+//! Lowest first: `disk`, `log` (the port), `sealing`, `checks`, the two logs `memory` and `sled`, with
+//! `caches` below the second, `directory`, `exchange`, `faults`, `testing`. Imports point downwards on
+//! this list only; `tests/tidy.rs` checks that they make no circle.
 
-mod cache;
-mod check;
-mod checkpoints;
+mod caches;
 mod checks;
-mod closed;
-pub mod conformance;
-mod copy;
-pub mod decoders;
-mod drill;
-mod entropy;
-mod export;
-mod faulty;
-mod files;
-mod heads;
-mod import;
-mod keys;
-mod layout;
-mod lock;
+mod directory;
+mod disk;
+mod exchange;
+mod faults;
 mod log;
 mod memory;
-mod models;
-mod open;
-mod origin;
-mod quiet;
-mod rescue;
-mod salvage;
 mod sealing;
 mod sled;
-mod snapshots;
+#[cfg(feature = "testing")]
+pub mod testing;
 
-pub use self::check::{CHECK_COMMAND, check_copy, check_with};
-pub use self::checkpoints::{CheckpointFeed, FeedError};
-pub use self::copy::{PrivateCopy, copy_private};
-pub use self::entropy::{Entropy, OsEntropy, SeededEntropy};
-pub use self::export::{ExportError, Exported, export, key_file_of};
-pub use self::faulty::{Fault, FaultPlan, FaultyLog};
-pub use self::import::{ImportError, Imported, import};
-pub use self::keys::{KeyError, Keys};
-pub use self::layout::LAYOUT;
-pub use self::log::{AppendError, EventLog, Pending, ReadError, SealedRecord, SealedRecords};
+pub use self::caches::models::ModelStore;
+pub use self::caches::origin::{CacheCounter, CacheCounts, Found, Origin};
+pub use self::caches::snapshots::SnapshotStore;
+pub use self::directory::check::{CHECK_COMMAND, check_copy, check_with};
+pub use self::directory::checkpoints::{CheckpointFeed, FeedError};
+pub use self::directory::copy::{PrivateCopy, copy_private};
+pub use self::directory::error::OpenError;
+pub use self::directory::layout::LAYOUT;
+pub use self::directory::open::open;
+pub use self::directory::store::{HISTORY_FILE, Store, open_memory};
+pub use self::exchange::export::{ExportError, Exported, export, key_file_of};
+pub use self::exchange::import::{ImportError, Imported, import};
+pub use self::exchange::rescue::{Loss, RescueError, StreamFound};
+pub use self::exchange::salvage::{SalvageError, Salvaged, Share, salvage};
+pub use self::faults::faulty::{Fault, FaultPlan, FaultyLog};
+pub use self::log::{
+    AppendError, Durable, EventLog, Pending, ReadError, SealedRecord, SealedRecords,
+};
 pub use self::memory::MemoryLog;
-pub use self::models::ModelStore;
-pub use self::open::{HISTORY_FILE, OpenError, Store, open, open_memory};
-pub use self::origin::{CacheCounter, CacheCounts, Found, Origin};
-pub use self::rescue::{Loss, RescueError, StreamFound};
-pub use self::salvage::{SalvageError, Salvaged, Share, salvage};
-pub use self::sealing::{DataKey, Draft, Sealed, Walk};
+pub use self::sealing::entropy::{Entropy, OsEntropy, SeededEntropy};
+pub use self::sealing::keys::{KeyError, Keys};
+pub use self::sealing::seal::{DataKey, Draft, Sealed, Walk};
 pub use self::sled::{Damage, SledLog};
-pub use self::snapshots::SnapshotStore;
+#[cfg(feature = "testing")]
+pub use self::testing::{conformance, decoders};

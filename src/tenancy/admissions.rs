@@ -65,15 +65,6 @@ impl Admissions {
         all.get(tenant).and_then(|standing| standing.keys().get(key)).is_some_and(|it| it.is_gone())
     }
 
-    /// The other tenant that ever admitted `key`.
-    pub fn claimed_by_other(&self, tenant: &TenantId, key: &PublicKey) -> Option<TenantId> {
-        let all = self.read();
-        let mut others = all.iter().filter(|(other, _)| *other != tenant);
-        others
-            .find(|(_, standing)| standing.keys().contains_key(key))
-            .map(|(other, _)| other.clone())
-    }
-
     /// What a tenant may take; the default for one that no order was about.
     pub fn quotas(&self, tenant: &TenantId) -> Quotas {
         let all = self.read();

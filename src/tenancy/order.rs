@@ -58,6 +58,17 @@ impl From<client::Order> for Order {
     }
 }
 
+impl Order {
+    /// The key that comes in or goes with it.
+    pub fn key(&self) -> Option<&PublicKey> {
+        match self {
+            Order::Admit { key, .. } | Order::Retire { key, .. } => Some(key),
+            Order::Rotate { new, .. } => Some(new),
+            _ => None,
+        }
+    }
+}
+
 /// What the tenant's key signs when a person is erased.
 pub fn erasure_statement(tenant: &TenantId, stream: StreamKey, last: Seq, head: Digest) -> Vec<u8> {
     format!("apprentice erasure 1\n{tenant}\n{stream}\n{last}\n{head}\n").into_bytes()

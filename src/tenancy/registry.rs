@@ -1,9 +1,11 @@
 use std::collections::BTreeMap;
 
+use super::{Order, Refusal, decide};
 use crate::events::{
-    Event, Head, Overlap, PersonErased, Quotas, Record, Role, SegmentClosed, TenantEvent,
+    Batch, Event, Head, Overlap, PersonErased, Quotas, Record, Role, SegmentClosed, TenantEvent,
 };
-use crate::ids::{PublicKey, Seq, StreamKey, Timestamp, WithinTenant};
+use crate::ids::{PublicKey, RequestId, Seq, StreamKey, Timestamp, WithinTenant};
+use crate::store::Durable;
 
 /// A tenant's stream, folded.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,6 +87,29 @@ impl Default for Registry {
 }
 
 impl Registry {
+    /// Decides an order. Only reads.
+    ///
+    /// - `wall`: what the wall clock reads; `request`: of the records.
+    /// - returns: what to append after [`Registry::head`]; none when it is so already.
+    /// - errors: [`Refusal`].
+    pub fn propose(
+        &self,
+        order: &Order,
+        wall: Timestamp,
+        request: RequestId,
+    ) -> Result<Option<Batch>, Refusal> {
+        let events = decide(self, order, wall)?;
+        let batch = Batch { request, at: self.next_at(wall), events };
+        Ok((!batch.events.is_empty()).then_some(batch))
+    }
+
+    /// Makes durable records true.
+    ///
+    /// - errors: as [`Registry::apply`].
+    pub fn settle(&mut self, durable: &Durable) -> Result<(), Disagreement> {
+        durable.records().iter().try_for_each(|record| self.apply(record))
+    }
+
     /// Applies one record. Total and pure.
     ///
     /// - errors: [`Disagreement`]; the registry is then not to be used any more.

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use apprentice::client::{OnClash, Phase, RejectionCode, Reply, Told};
 use apprentice::events::{Event, Record};
 use apprentice::ids::{RequestId, Seq, TenantId, Timestamp, UserId};
+use apprentice::invariants::Invariant;
 use apprentice::learning::{Recipe, train};
-use apprentice::replay::{Minds, rebuild, rebuild_at};
+use apprentice::replay::{Minds, read_back, rebuild, rebuild_at};
 use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session};
 use apprentice::store::{Store, open_memory};
 use apprentice::world::Stage;
@@ -302,6 +303,11 @@ fn a_repeated_request_is_answered_from_the_log() {
     let request = RequestId([person.requests; 16]);
     let again = person.session.propose(&command, request, Timestamp(2_000)).unwrap();
     assert_eq!(again, Proposed::Repeat { first: reply.first, last: reply.last });
+    let records = (reply.first, reply.last);
+    read_back(&*person.store.log, &person.stream, request, records).unwrap();
+    let other = RequestId([99; 16]);
+    let error = read_back(&*person.store.log, &person.stream, other, records).unwrap_err();
+    assert!(error.contains(&Invariant::ExactlyOnce.to_string()), "{error}");
 }
 
 #[test]
@@ -335,7 +341,26 @@ fn a_past_that_this_binary_computes_otherwise_is_a_divergence_not_a_guess() {
         before.for_each(|past| session.apply(&past).unwrap());
         let divergence = session.apply(&record).unwrap_err();
         assert_eq!((divergence.seq, divergence.field), (record.seq, "scene digest"));
+        assert_eq!(divergence.law(), Some(Invariant::SceneAgrees));
         return;
     }
     panic!("nothing was said");
+}
+
+#[test]
+#[should_panic(expected = "ModelAgrees")]
+fn another_mind_than_the_state_names_is_not_installed() {
+    let mut person = Person::at(Phase::Learning);
+    let before = person.session.mind().unwrap().clone();
+    person.learn();
+    person.session.install(before);
+}
+
+#[test]
+#[should_panic(expected = "NoLostWork")]
+fn a_training_that_lost_a_lesson_does_not_run_without_it() {
+    let person = Person::at(Phase::Learning);
+    let mut state = person.session.state().clone();
+    state.lessons.clear();
+    Session::resume(person.session.domain().clone(), state).outstanding();
 }

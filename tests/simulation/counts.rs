@@ -4,19 +4,28 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Counts(BTreeMap<&'static str, u64>);
 
-/// What must happen at least once, or the run shows nothing.
-const KINDS: [&str; 21] = [
+/// What must happen in a run that is to show anything.
+const KINDS: [&str; 30] = [
     "acknowledged",
     "appends failed",
     "appends in conflict",
+    "appends of labs failed",
+    "appends of labs in conflict",
     "busy people not erased yet",
     "caches lost",
+    "checkpoints",
     "crashes",
     "deaths of an actor",
+    "erasures finished later",
     "evictions",
+    "labs read again",
     "mailboxes full",
     "no room for one more awake",
+    "orders obeyed",
+    "orders refused",
     "people erased",
+    "registrars too busy",
+    "registrars' starts interrupted",
     "rejected",
     "repeated",
     "seats that left",

@@ -2,8 +2,8 @@
 
 use apprentice::invariants::Invariant;
 
-/// What the simulated service does wrong. The seat and the directory are the shipped ones. Each
-/// defect is in the code that drives them, because that is where such a service can go wrong.
+/// What the simulated service does wrong. What decides is the shipped code: all of these are in how
+/// it is driven, which is where a service of their kind can go wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Defect {
     None,
@@ -29,10 +29,16 @@ pub enum Defect {
     MixesTenants,
     /// Loses the order to close segments.
     ForgetsSegments,
+    /// Answers an operator before the log has said that the order is durable.
+    ObeysEarly,
+    /// Destroys a person's key only when their erasure is on record.
+    NotesFirst,
+    /// Does not tell the doors what was ordered.
+    ForgetsDoors,
 }
 
 /// Each defect, and the laws it may be seen to break.
-pub const DEFECTS: [(Defect, &[Invariant]); 11] = [
+pub const DEFECTS: [(Defect, &[Invariant]); 14] = [
     (Defect::AnswersEarly, &[Invariant::DurableBeforeReply, Invariant::AnsweredOnce]),
     (Defect::ForgetsRequests, &[Invariant::ExactlyOnce]),
     (Defect::ForgetsTrainings, &[Invariant::NoLostWork]),
@@ -44,4 +50,7 @@ pub const DEFECTS: [(Defect, &[Invariant]); 11] = [
     (Defect::ErasesAtOnce, &[Invariant::SingleWriter]),
     (Defect::MixesTenants, &[Invariant::ExactlyOnce, Invariant::DurableBeforeReply]),
     (Defect::ForgetsSegments, &[Invariant::NoLostWork]),
+    (Defect::ObeysEarly, &[Invariant::DurableBeforeReply, Invariant::AnsweredOnce]),
+    (Defect::NotesFirst, &[Invariant::NoLostWork]),
+    (Defect::ForgetsDoors, &[Invariant::FoldAgrees]),
 ];

@@ -1,20 +1,19 @@
-//! What actix, trainers and the registrar do in the service: carry out the effects of seats and
-//! directory, and give them the results.
+//! What actix and trainers do in the service: carry out what seats and directory say, and tell them
+//! what came of it.
 
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 
 use apprentice::actors::{
-    DirectoryEffect, DirectoryInput, Effect, Input, Letter, NotDelivered, OrderError,
-    TenantRegistry, Undelivered, wall_clock,
+    DirectoryEffect, DirectoryInput, Effect, Input, Letter, NotDelivered, Undelivered,
 };
 use apprentice::client::{ErrorCode, PersonAsk, Reply, Response};
 use apprentice::events::Head;
-use apprentice::ids::{StreamId, TenantId, Timestamp};
+use apprentice::ids::{StreamId, Timestamp};
 use apprentice::invariants::Invariant;
 use apprentice::learning;
-use apprentice::replay::{Through, keep_mind, keep_snapshot, read_back, rebuild};
+use apprentice::replay::{keep_mind, keep_snapshot, read_back, rebuild};
 use apprentice::session::Session;
 use apprentice::store::Pending;
 
@@ -48,10 +47,10 @@ impl System {
                 let generation = present.filter(|_| forgets).unwrap_or(generation);
                 DirectoryInput::Leaving { stream, generation }
             }
-            ToDirectory::Other(DirectoryInput::Erase { stream, caller })
+            ToDirectory::Other(DirectoryInput::Erase { stream, .. })
                 if self.defect == Defect::ErasesAtOnce =>
             {
-                return self.erase(stream, caller);
+                return self.erase(process, stream);
             }
             ToDirectory::Other(input) => input,
         };
@@ -125,7 +124,7 @@ impl System {
                     }
                 }
             }
-            DirectoryEffect::Erase { stream, caller } => return self.erase(stream, caller),
+            DirectoryEffect::Erase { stream, .. } => return self.erase(process, stream),
             DirectoryEffect::StillBusy { .. } => {}
             DirectoryEffect::LookAgain { stream, .. } => {
                 self.note(|| format!("{stream} is too busy to be erased"));
@@ -160,7 +159,7 @@ impl System {
         if let Some(pending) = actor.pending.take() {
             return self.poll(process, generation, pending);
         }
-        let (at, fresh) = (Timestamp(self.clock), self.fresh_request());
+        let (at, fresh) = (Timestamp(self.now()), self.fresh_request());
         let defect = self.defect;
         let Some(actor) = self.processes[process].actors.get_mut(&generation) else {
             return Ok(());
@@ -232,9 +231,9 @@ impl System {
                 }
                 self.misbehave(process, generation, after)?;
             }
-            Effect::ReadBack { first, last } => {
+            Effect::ReadBack { request, first, last } => {
                 self.counts.one("repeated");
-                let records = read_back(&*self.store.log, &stream, first, last);
+                let records = read_back(&*self.store.log, &stream, request, (first, last));
                 return Ok(Some(Input::ReadBack(records)));
             }
             Effect::FindMind(digest) => {
@@ -264,7 +263,7 @@ impl System {
                 let mind = session.and_then(Session::mind).map(|mind| mind.digest());
                 let _ = self.store.models.keep_only(&stream, mind.as_slice());
             }
-            Effect::CloseSegments => self.close_segments(process, &stream)?,
+            Effect::CloseSegments => self.close_segments(process, stream)?,
             Effect::Publish(_) => {}
             Effect::SetTimer(timer, _) => {
                 if let Some(actor) = self.processes[process].actors.get_mut(&generation) {
@@ -495,102 +494,5 @@ impl System {
         let stream = self.people[person].stream.clone();
         let erase = DirectoryInput::Erase { stream, caller: person };
         self.processes[0].to_directory.push_back(ToDirectory::Other(erase));
-    }
-
-    /// The registrar destroys a person's key. No seat may speak for the person then.
-    fn erase(&mut self, stream: StreamId, person: usize) -> Result<(), Broken> {
-        let mut actors = self.processes[0].actors.values();
-        let speaks = actors.find(|actor| actor.stream == stream && actor.speaks());
-        if let Some(actor) = speaks {
-            let how = format!("seat {} speaks for somebody who is erased", actor.generation);
-            return Err(broken(Invariant::SingleWriter, how));
-        }
-        let erased = self.registry(0)?.map(|registry| registry.erase(&stream));
-        self.note(|| format!("erases {stream}: {erased:?}"));
-        let over = ToDirectory::Other(DirectoryInput::Erased { stream: stream.clone() });
-        self.processes[0].to_directory.push_back(over);
-        // The key is destroyed first. If the record of it is refused, the next start appends it.
-        if self.store.keys.erased(&stream.tenant).unwrap().contains(&stream) {
-            self.counts.one("people erased");
-            let (store, person) = (&self.store, &mut self.people[person]);
-            person.start_over(store.keys.stream_id(&person.tenant, &person.user).unwrap());
-        }
-        Ok(())
-    }
-
-    fn close_segments(&mut self, process: usize, stream: &StreamId) -> Result<(), Broken> {
-        if self.defect == Defect::ForgetsSegments {
-            return Ok(());
-        }
-        let Some(registry) = self.registry(process)? else { return Ok(()) };
-        match registry.close(stream, Through::Episodes) {
-            Ok(closed) => self.counts.many("segments closed", closed as u64),
-            // Closed when they wake again.
-            Err(OrderError::Append { .. } | OrderError::Read { .. }) => {
-                self.processes[process].registry = None;
-            }
-            Err(error) => return Err(broken(Invariant::FoldAgrees, error.to_string())),
-        }
-        Ok(())
-    }
-
-    /// A process's tenant registry; none if its log refuses at the moment.
-    fn registry(&mut self, process: usize) -> Result<Option<&mut TenantRegistry>, Broken> {
-        let holder = &mut self.processes[process];
-        if holder.registry.is_none() {
-            let mut registry =
-                match TenantRegistry::open_by(self.registry_store.clone(), wall_clock()) {
-                    Ok(registry) => registry,
-                    Err(OrderError::Append { .. }) => return Ok(None),
-                    Err(error) => return Err(broken(Invariant::FoldAgrees, error.to_string())),
-                };
-            for name in ["bells", "chimes"] {
-                let tenant = TenantId::new(name).unwrap();
-                let opened = registry.obey(&tenant, &apprentice::tenancy::Order::Open);
-                if opened.is_err() {
-                    return Ok(None);
-                }
-            }
-            holder.registry = Some(registry);
-        }
-        Ok(holder.registry.as_mut())
-    }
-
-    /// At the end, every episode that ended is in a closed segment, every erasure is recorded, and
-    /// the fold of each tenant's own stream is what the registry holds.
-    pub fn check_registries(&mut self) -> Result<(), Broken> {
-        let streams: Vec<StreamId> = self.people.iter().map(|it| it.stream.clone()).collect();
-        let Some(registry) = self.registry(0)? else {
-            return Err(broken(Invariant::NoLostWork, "the registry cannot be opened"));
-        };
-        for stream in streams {
-            let left = registry.close(&stream, Through::Episodes);
-            if left != Ok(0) {
-                let how = format!("segments of {stream} were left open: {left:?}");
-                return Err(broken(Invariant::NoLostWork, how));
-            }
-        }
-        let held: Vec<_> =
-            registry.tenants().iter().map(|tenant| registry.registry(tenant)).collect();
-        self.crash(0);
-        let Some(read) = self.registry(0)? else {
-            return Err(broken(Invariant::NoLostWork, "the registry cannot be opened"));
-        };
-        let read: Vec<_> = read.tenants().iter().map(|tenant| read.registry(tenant)).collect();
-        if held != read {
-            return Err(broken(Invariant::FoldAgrees, "the registry differs from its records"));
-        }
-        for tenant in ["bells", "chimes"].map(|name| TenantId::new(name).unwrap()) {
-            for stream in self.store.keys.erased(&tenant).unwrap() {
-                let recorded = self.store.log.walk(&stream).map(|head| head.seq);
-                let noted = self
-                    .registry(0)?
-                    .is_some_and(|it| it.registry(&tenant).erased().contains_key(&stream.key));
-                if recorded.is_ok_and(|records| records > 0) && !noted {
-                    return Err(broken(Invariant::NoLostWork, "an erasure is not on record"));
-                }
-            }
-        }
-        Ok(())
     }
 }

@@ -1,11 +1,12 @@
-//! One process of the service: the shipped directory, seats and tenant registry, each with its
-//! mailbox. It does the work of actix one step at a time; the seed decides which step is next.
+//! One process of the service: the shipped directory, seats and tenants' writer, each with its
+//! mailbox. What actix does in the service is done here one step at a time, when dice say so.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use apprentice::actors::{
-    Attention, Directory, DirectoryInput, NewSession, Presence, Seat, TenantRegistry, Timer,
+    Attention, Directory, DirectoryInput, NewSession, Presence, Seat, TenantWork, TenantWriter,
+    Timer, WriterInput,
 };
 use apprentice::client::PersonAsk;
 use apprentice::ids::{Digest, RequestId, StreamId, UserId};
@@ -13,12 +14,15 @@ use apprentice::learning::{Lesson, Mind, Recipe};
 use apprentice::replay::Minds;
 use apprentice::session::Session;
 use apprentice::store::Pending;
+use apprentice::tenancy::{Admissions, Clock};
 use apprentice::world::Domain;
 
 use apprentice_testkit::toy::Bells;
 
 /// The most requests that may wait for one seat.
 pub const MAILBOX_MAX: usize = 2;
+/// Work that waits for one registrar.
+pub const WORK_MAX: usize = 6;
 
 /// The memory of one process. It is lost when the process dies.
 pub struct Process {
@@ -27,15 +31,49 @@ pub struct Process {
     /// Actors by their generation, the number of the seat.
     pub actors: BTreeMap<u64, Actor>,
     pub minds: Minds,
-    /// None until it is needed, and if it could not be read.
-    pub registry: Option<TenantRegistry>,
-    /// Numbers of the requests that this process accepted and has not answered.
+    pub registrar: Registrar,
+    /// Numbers of the requests that this process has taken and not answered.
     pub unanswered: BTreeSet<u64>,
     /// It was told to stop: it wakes no user any more.
     pub stops: bool,
 }
 
-/// Says who gets the answer.
+/// The tenants' writer, and what waits for it.
+pub struct Registrar {
+    /// None until it is needed, and when the log could not be read.
+    pub writer: Option<TenantWriter<Caller>>,
+    pub doors: Admissions,
+    pub queue: VecDeque<(TenantWork, Caller)>,
+    pub pending: Option<Pending>,
+    /// The end of what was carried out last, not told yet.
+    pub end: Option<WriterInput<Caller>>,
+    /// Whose work it does.
+    pub current: Option<Caller>,
+    /// With a defect: a key that is destroyed later.
+    pub spared: Option<StreamId>,
+}
+
+/// Who waits for the end of work.
+#[derive(Debug, Clone)]
+pub struct Caller {
+    pub number: u64,
+    pub whom: Whom,
+}
+
+#[derive(Debug, Clone)]
+pub enum Whom {
+    /// Who gave an order, by its number.
+    Operator(usize),
+    Auditor,
+    /// A seat, which hears nothing.
+    Seat,
+    /// The directory, while a person is erased.
+    Directory(StreamId),
+    /// The start of the process, which finishes what the one before left.
+    Start,
+}
+
+/// A way back: whom to answer.
 pub struct Ticket {
     pub number: u64,
     /// None for a query, which changes nothing.
@@ -97,13 +135,13 @@ pub struct Job {
 }
 
 impl Process {
-    pub fn new(awake_max: usize) -> Process {
+    pub fn new(awake_max: usize, clock: &Clock) -> Process {
         Process {
             directory: Directory::new(awake_max),
             to_directory: VecDeque::new(),
             actors: BTreeMap::new(),
             minds: Minds::default(),
-            registry: None,
+            registrar: Registrar::new(clock),
             unanswered: BTreeSet::new(),
             stops: false,
         }
@@ -127,7 +165,27 @@ impl Process {
 
     /// True if all work is done, except timers and trainings.
     pub fn is_quiet(&self) -> bool {
-        self.to_directory.is_empty() && self.actors.values().all(|actor| !actor.can_act())
+        self.to_directory.is_empty()
+            && self.actors.values().all(|actor| !actor.can_act())
+            && !self.registrar.can_act()
+    }
+}
+
+impl Registrar {
+    fn new(clock: &Clock) -> Registrar {
+        Registrar {
+            writer: None,
+            doors: Admissions::new(clock.clone()),
+            queue: VecDeque::new(),
+            pending: None,
+            end: None,
+            current: None,
+            spared: None,
+        }
+    }
+
+    pub fn can_act(&self) -> bool {
+        self.pending.is_some() || self.end.is_some() || !self.queue.is_empty()
     }
 }
 

@@ -1,21 +1,24 @@
-//! Two processes on one faulty log, in an order that the seed decides. Both run the shipped seats,
-//! directory and tenant registry. Only the first process should be there.
+//! Two processes over one faulty log, in an order that dice choose. Both run the shipped seats,
+//! directory and tenants' writer; the second is the one that should not be there.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use apprentice::actors::NewSession;
 use apprentice::client::{PersonAsk, Phase, Query, Response};
-use apprentice::ids::{RequestId, StreamId, TenantId, UserId};
+use apprentice::ids::{RequestId, StreamId, TenantId, Timestamp, UserId};
 use apprentice::invariants::Invariant;
 use apprentice::learning::{self, Recipe};
 use apprentice::replay::mind_origin;
 use apprentice::session::Session;
 use apprentice::store::{EventLog, FaultPlan, FaultyLog, Keys, MemoryLog, SeededEntropy, Store};
+use apprentice::tenancy::Clock;
 
 use crate::counts::Counts;
 use crate::defects::Defect;
 use crate::disturbed::Disturbed;
 use crate::oracle::{Broken, Truth, broken};
+use crate::orders::Given;
 use crate::people::{Heard, Person};
 use crate::process::{Asked, Job, Parcel, Process, Ticket, ToDirectory};
 use apprentice_testkit::dice::Dice;
@@ -23,18 +26,18 @@ use apprentice_testkit::toy::Bells;
 
 pub struct System {
     pub dice: Dice,
-    pub clock: u64,
+    /// What the wall clock of every machine reads.
+    time: Arc<AtomicU64>,
     pub defect: Defect,
     pub domain: Arc<Bells>,
-    inner: Arc<MemoryLog>,
+    pub inner: Arc<MemoryLog>,
     faulty: Arc<FaultyLog>,
     pub disturbed: Arc<Disturbed>,
     pub store: Store,
-    /// The log of the tenant registries. Appends may be refused. None is delayed, because a
-    /// registry waits for its own appends.
-    pub registry_store: Store,
     pub processes: [Process; 2],
     pub people: Vec<Person>,
+    /// What operators ordered, oldest first.
+    pub orders: Vec<Given>,
     pub jobs: Vec<Job>,
     tickets: u64,
     /// The most people of one lab who may be awake.
@@ -57,6 +60,9 @@ enum Move {
     Timer,
     Release,
     Train,
+    Registrar,
+    Order,
+    Sign,
     Erase,
     CrashAll,
     CrashOne,
@@ -68,7 +74,7 @@ enum Move {
     Look,
 }
 
-const MOVES: [(usize, Move); 17] = [
+const MOVES: [(usize, Move); 20] = [
     (24, Move::Ask),
     (30, Move::Deliver),
     (4, Move::Question),
@@ -77,6 +83,9 @@ const MOVES: [(usize, Move); 17] = [
     (5, Move::Timer),
     (8, Move::Release),
     (18, Move::Train),
+    (30, Move::Registrar),
+    (4, Move::Order),
+    (1, Move::Sign),
     (1, Move::Erase),
     (1, Move::CrashAll),
     (1, Move::CrashOne),
@@ -100,7 +109,13 @@ pub fn beginning() -> &'static (Arc<Bells>, Arc<NewSession>) {
     })
 }
 
-/// Two labs. Each has a user called ada.
+/// The clock that every machine reads.
+fn clock(time: &Arc<AtomicU64>) -> Clock {
+    let time = time.clone();
+    Clock::new(move || Timestamp(time.load(Ordering::Relaxed)))
+}
+
+/// Two labs; both have an ada.
 const PEOPLE: [(&str, &str); 3] = [("bells", "ada"), ("bells", "grace"), ("chimes", "ada")];
 
 impl System {
@@ -120,12 +135,9 @@ impl System {
             crashes_after: share(12),
             ..FaultPlan::default()
         };
-        let for_registries = FaultPlan { seed, refused: share(80), ..FaultPlan::default() };
         let faulty = Arc::new(FaultyLog::new(inner.clone(), plan));
         let disturbed = Arc::new(Disturbed::new(faulty.clone()));
         let store = Store::around(disturbed.clone(), keys);
-        let refusing = Arc::new(FaultyLog::new(inner.clone(), for_registries));
-        let registry_store = store.clone().with_log(refusing);
         let person = |(tenant, user): (&str, &str)| {
             let (tenant, user) = (TenantId::new(tenant).unwrap(), UserId::new(user).unwrap());
             store.keys.make_tenant(&tenant).unwrap();
@@ -134,9 +146,10 @@ impl System {
         };
         let awake_max = 2 + dice.below(2);
         let awake_limit = dice.chance(30).then_some(1);
+        let time = Arc::new(AtomicU64::new(1_000_000));
+        let process = || Process::new(awake_max, &clock(&time));
         System {
             dice,
-            clock: 1_000_000,
             defect,
             domain: beginning().0.clone(),
             inner,
@@ -144,8 +157,9 @@ impl System {
             disturbed,
             people: PEOPLE.map(person).into(),
             store,
-            registry_store,
-            processes: [Process::new(awake_max), Process::new(awake_max)],
+            processes: [process(), process()],
+            time,
+            orders: Vec::new(),
             jobs: Vec::new(),
             tickets: 0,
             awake_limit,
@@ -166,7 +180,8 @@ impl System {
     fn live(&mut self, moves: usize) -> Result<(), Broken> {
         for _ in 0..moves {
             self.counts.one("steps");
-            self.clock += self.dice.below(5_000) as u64;
+            let pause = self.dice.below(5_000) as u64;
+            self.set_clock(self.now() + pause);
             let step = self.dice.weighted(&MOVES);
             self.note(|| format!("{step:?}"));
             self.make(step)?;
@@ -204,8 +219,11 @@ impl System {
                     self.train(job);
                 }
             }
-            // Only the registrar of the first process erases people.
-            Move::Erase if self.dice.chance(30) => self.ask_to_erase(person),
+            Move::Registrar => self.step_registrar(process)?,
+            Move::Order => self.order(process)?,
+            Move::Sign => self.ask_to_sign(process)?,
+            // The rightful process alone erases people.
+            Move::Erase if self.dice.chance(60) => self.ask_to_erase(person),
             Move::Erase => {}
             Move::CrashAll if self.dice.chance(40) => self.crash_all()?,
             Move::CrashAll => {}
@@ -218,9 +236,15 @@ impl System {
                 self.store.snapshots.forget(&self.people[person].stream).unwrap();
             }
             Move::LoseMinds => self.lose_minds(person),
-            // The clocks of machines can go backwards.
-            Move::JumpInTime => self.clock = self.clock / 2 + self.dice.below(1_000_000) as u64,
-            Move::Look => self.look(person)?,
+            // Clocks of machines go backwards, too.
+            Move::JumpInTime => {
+                let back = self.now() / 2 + self.dice.below(1_000_000) as u64;
+                self.set_clock(back);
+            }
+            Move::Look => {
+                self.look(person)?;
+                self.look_at_labs()?;
+            }
         }
         Ok(())
     }
@@ -267,8 +291,7 @@ impl System {
         request: RequestId,
         asked: Option<Asked>,
     ) {
-        self.tickets += 1;
-        let ticket = Ticket { number: self.tickets, asked, attention: None };
+        let ticket = Ticket { number: self.next_ticket(), asked, attention: None };
         let Person { user, stream, .. } = &self.people[person];
         let (user, mut stream) = (user.clone(), stream.clone());
         if self.defect == Defect::MixesTenants {
@@ -317,13 +340,13 @@ impl System {
         for person in 0..self.people.len() {
             self.look(person)?;
         }
-        Ok(())
+        self.look_at_labs()
     }
 
     pub fn crash(&mut self, process: usize) {
         self.note(|| format!("process {process} dies"));
         self.jobs.retain(|job| job.process != process);
-        self.processes[process] = Process::new(self.awake_max);
+        self.processes[process] = Process::new(self.awake_max, &clock(&self.time));
     }
 
     fn lose_minds(&mut self, person: usize) {
@@ -362,7 +385,6 @@ impl System {
         self.work_off(0)?;
         self.crash_all()?;
         self.store = self.store.clone().with_log(self.inner.clone());
-        self.registry_store = self.registry_store.clone().with_log(self.inner.clone());
         for person in 0..self.people.len() {
             for index in self.people[person].unanswered() {
                 while self.people[person].asked[index].heard == Heard::Nothing {
@@ -379,16 +401,17 @@ impl System {
             }
             self.check_at_the_end(person)?;
         }
-        self.check_registries()
+        self.settle_labs()
     }
 
-    /// Does all the work, up to the last answer, and checks that every request is answered.
-    fn work_off(&mut self, process: usize) -> Result<(), Broken> {
+    /// Works off all that came in, to the last answer, and sees that nobody was forgotten.
+    pub fn work_off(&mut self, process: usize) -> Result<(), Broken> {
         while !self.processes[process].is_quiet() && !self.faulty.crashed() {
             self.faulty.release();
             self.step_directory(process)?;
             self.act_one(process)?;
-            self.clock += 1;
+            self.step_registrar(process)?;
+            self.set_clock(self.now() + 1);
         }
         if self.faulty.crashed() {
             return Ok(());
@@ -420,6 +443,20 @@ impl System {
         let records = self.inner.head(&stream).expect("it is in memory").seq;
         self.counts.many("records", records);
         Ok(())
+    }
+
+    /// Microseconds.
+    pub fn now(&self) -> u64 {
+        self.time.load(Ordering::Relaxed)
+    }
+
+    fn set_clock(&self, time: u64) {
+        self.time.store(time, Ordering::Relaxed);
+    }
+
+    pub fn next_ticket(&mut self) -> u64 {
+        self.tickets += 1;
+        self.tickets
     }
 
     pub fn fresh_request(&mut self) -> RequestId {

@@ -6,8 +6,9 @@ use std::fs;
 use std::sync::Arc;
 
 use apprentice::client::OnClash;
-use apprentice::events::{Event, Report};
+use apprentice::events::{Event, Head, Report};
 use apprentice::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
+use apprentice::invariants::Invariant;
 use apprentice::learning::{Mind, Recipe, code_digest, train};
 use apprentice::replay::{
     Minds, RebuildError, Work, keep_mind, keep_snapshot, mind_origin, rebuild, state_origin,
@@ -170,6 +171,20 @@ fn what_other_code_another_form_or_another_recipe_left_is_made_again_and_counted
         let counts = (store.snapshots.counts(), store.models.counts());
         assert_eq!(counts, (stale(), stale()), "{state_then:?}");
     }
+}
+
+#[test]
+fn a_snapshot_of_another_record_than_it_says_is_not_used() {
+    let ada = Ada::new();
+    let store = ada.open();
+    let (expected, _) = ada.wake(&store);
+    let origin = state_origin(&*ada.domain, expected.recipe().digest());
+    let first = store.log.read(&ada.stream, Seq::FIRST).unwrap().next().unwrap().unwrap();
+    let early = Head { seq: first.seq.get(), digest: first.digest };
+    store.snapshots.put(&ada.stream, &origin, early, expected.state()).unwrap();
+    let (session, work) = ada.wake(&store);
+    assert_eq!(work.events_folded, session.head().seq, "{}", Invariant::FoldAgrees);
+    assert_eq!(session.state_digest(), expected.state_digest());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use apprentice_testkit::paths::root;
-use source::{SOURCES, sources};
+use source::{SOURCES, Source, rust_files, sources};
 
 fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -73,6 +73,7 @@ fn rooms_import_only_what_the_map_allows() {
             let fine = named == here
                 || shared.contains(&named.as_str())
                 || allowed.contains(named)
+                || allows_what_is_named(&allowed, named, source)
                 || !walls.contains_key(named);
             if !fine {
                 wrong.push(format!("{} imports `{named}`, which `{here}` may not", source.name));
@@ -80,6 +81,67 @@ fn rooms_import_only_what_the_map_allows() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Whether a room may import all that a file names of another one: single names, as `store::Durable`.
+fn allows_what_is_named(allowed: &[String], room: &str, source: &Source) -> bool {
+    let named = source.paths.iter().filter(|path| path.len() > 1 && path[..2] == ["crate", room]);
+    let mut names = named.map(|path| path.get(2).map(|name| format!("{room}::{name}")));
+    let known = |name: Option<String>| name.is_some_and(|name| allowed.contains(&name));
+    names.all(known) && allowed.iter().any(|name| name.starts_with(&format!("{room}::")))
+}
+
+/// The folders and files of the store, and the files of each folder, from each to those it imports.
+fn arrows_in_the_store() -> BTreeMap<String, BTreeSet<String>> {
+    let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in sources() {
+        let Some(below) = source.name.strip_prefix("store/").filter(|it| *it != "mod.rs") else {
+            continue;
+        };
+        let parts: Vec<&str> = below.trim_end_matches(".rs").split('/').collect();
+        let unit = parts[0];
+        let of_store = source.paths.iter().filter(|path| path.len() > 2 && path[1] == "store");
+        let named: BTreeSet<String> = of_store.map(|path| path[2].clone()).collect();
+        for name in &named {
+            let fine = place_of(&format!("store/{name}")).is_some();
+            assert!(fine, "{below} imports `store::{name}`; name the file that holds it");
+        }
+        let others = named.into_iter().filter(|name| name != unit);
+        arrows.entry(unit.to_owned()).or_default().extend(others);
+        // A folder's `mod.rs` declares the files beside it.
+        if let [folder, file, ..] = parts[..]
+            && file != "mod"
+        {
+            let beside = source.paths.iter().filter(|path| path.len() > 1 && path[0] == "super");
+            let beside = beside.map(|path| format!("{folder}/{}", path[1]));
+            let beside = beside.filter(|name| place_of(&format!("store/{name}")).is_some());
+            let itself = format!("{folder}/{file}");
+            arrows.entry(itself.clone()).or_default().extend(beside.filter(|name| *name != itself));
+        }
+    }
+    arrows
+}
+
+/// What is left when everything is taken away that imports nothing that is left.
+fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    loop {
+        let before = arrows.len();
+        let left: BTreeSet<String> = arrows.keys().cloned().collect();
+        arrows.retain(|_, named| named.iter().any(|name| left.contains(name)));
+        if arrows.len() == before {
+            return left.into_iter().collect();
+        }
+    }
+}
+
+#[test]
+fn imports_inside_the_store_make_no_circle() {
+    let arrows = arrows_in_the_store();
+    assert!(arrows.len() > 30 && arrows["directory"].contains("sled"), "{arrows:?}");
+    assert_eq!(circle(arrows), Vec::<String>::new());
+    let arrow = |from: &str, to: &str| (from.to_owned(), BTreeSet::from([to.to_owned()]));
+    let round = BTreeMap::from([arrow("a", "b"), arrow("b", "c"), arrow("c", "b")]);
+    assert_eq!(circle(round).len(), 3, "the check can fail");
 }
 
 #[test]
@@ -227,14 +289,6 @@ fn every_test_module_is_compiled_and_has_its_line() {
 }
 
 #[test]
-fn only_the_store_gives_receipts() {
-    for source in sources() {
-        let fine = source.room() == "store" || source.name == "events/receipt.rs";
-        assert!(fine || !source.words.contains("mint"), "{} makes a receipt", source.name);
-    }
-}
-
-#[test]
 fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
     let core = [
         "fairness",
@@ -283,8 +337,16 @@ fn the_core_has_no_clock_no_entropy_and_no_unordered_map() {
 
 /// All decisions must be in the code that the simulator drives.
 #[test]
-fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
-    let pure = ["actors/seat/", "actors/directory/mod.rs", "actors/directory/erasure.rs"];
+fn what_decides_for_the_actors_has_no_actix_no_clock_no_thread_and_no_file() {
+    let pure = [
+        "actors/seat/",
+        "actors/directory/mod.rs",
+        "actors/directory/erasure.rs",
+        "actors/registrar/mod.rs",
+        "actors/registrar/effect.rs",
+        "actors/registrar/error.rs",
+        "actors/registrar/plan.rs",
+    ];
     let banned = [
         "actix",
         "tokio",
@@ -300,6 +362,8 @@ fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
         "HashSet",
         "Mutex",
         "EventLog",
+        "Clock",
+        "mpsc",
     ];
     let mut seen = 0;
     for source in sources() {
@@ -309,7 +373,59 @@ fn seats_and_the_directory_have_no_actix_no_clock_no_thread_and_no_file() {
             assert_eq!(found, None, "{}", source.name);
         }
     }
-    assert!(seen >= 6, "{seen} files");
+    assert!(seen >= 10, "{seen} files");
+}
+
+/// The names behind `before` at the beginning of the lines of a file, up to what is no name.
+fn names_in(path: &str, before: &str) -> Vec<String> {
+    let text = read(&root().join(path));
+    let lines = text.lines().filter_map(|line| line.strip_prefix(before));
+    let names = lines.map(|rest| {
+        rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>()
+    });
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn shipped_code_and_a_test_name_each_invariant() {
+    let laws = names_in("crates/core/src/invariants.rs", "    ");
+    let laws: Vec<String> =
+        laws.into_iter().filter(|name| name.starts_with(char::is_uppercase)).collect();
+    assert!(laws.len() >= 10, "{laws:?}");
+    let mut tests = String::new();
+    let others = ["tests", "crates/testkit/src"].into_iter();
+    for folder in SOURCES.iter().map(|(folder, _)| *folder).chain(others) {
+        for path in rust_files(&root().join(folder)).iter().filter(|path| !path.ends_with(file!()))
+        {
+            let text = read(path);
+            // Of a file of the product, what stands behind its own tests' head.
+            let is_product = folder != "tests" && !path.ends_with("tests.rs");
+            let from = is_product.then(|| text.find("mod tests {")).unwrap_or(Some(0));
+            tests += from.map_or("", |from| &text[from..]);
+        }
+    }
+    for law in laws {
+        let ends = |path: &Vec<String>| path.ends_with(&["Invariant".to_owned(), law.clone()]);
+        let asserts =
+            |source: &&Source| source.name != "invariants.rs" && source.paths.iter().any(ends);
+        assert!(sources().iter().any(|source| asserts(&source)), "nothing asserts {law}");
+        let named = [format!("Invariant::{law}"), format!("\"{law}\"")];
+        assert!(named.iter().any(|name| tests.contains(name)), "no test breaks {law}");
+    }
+}
+
+#[test]
+fn every_limit_is_used() {
+    let limits = names_in("crates/core/src/limits.rs", "pub const ");
+    assert!(limits.len() > 50, "{} limits", limits.len());
+    for limit in limits {
+        let users = sources().iter().filter(|source| source.name != "limits.rs");
+        let used = |source: &Source| {
+            source.words.contains(&limit)
+                || source.paths.iter().any(|path| path.last() == Some(&limit))
+        };
+        assert!(users.into_iter().any(used), "nothing enforces {limit}");
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use apprentice_testkit::paths::root;
 use proc_macro2::{TokenStream, TokenTree};
@@ -69,8 +70,13 @@ impl Source {
     }
 }
 
-/// Every source file of the product.
-pub fn sources() -> Vec<Source> {
+/// Every source file of the product, read once.
+pub fn sources() -> &'static [Source] {
+    static SOURCES: OnceLock<Vec<Source>> = OnceLock::new();
+    SOURCES.get_or_init(read_sources)
+}
+
+fn read_sources() -> Vec<Source> {
     let mut found = Vec::new();
     for (folder, room) in SOURCES {
         let folder = root().join(folder);

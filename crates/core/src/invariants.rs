@@ -1,12 +1,13 @@
-//! The laws by name. The name is what an assertion, a test and a bug report use.
+//! The laws by name. The name is what an assertion, a test and a bug report use. `tests/tidy.rs`
+//! checks that code that is shipped and a test name each of them.
 
 use std::fmt;
 
 /// What must always hold; see `ARCHITECTURE.md`, *Laws*.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Invariant {
-    /// A reply exists only for durable events. Kept by type: `Session::settle` demands a receipt
-    /// that only `store/` can make.
+    /// A reply exists only for durable events. Kept by type: `Session::settle` demands a receipt,
+    /// and only `store/` can make one.
     DurableBeforeReply,
     /// One stream has one writer at a time: `append` carries the expected head.
     SingleWriter,

@@ -41,9 +41,6 @@ pub const SCENE_FILE_BYTES_MAX: usize = 256 * 1024;
 
 /// Request ids remembered per stream.
 pub const REQUEST_RING: usize = 1_024;
-/// Requests one client may have unanswered; far below [`REQUEST_RING`], or a retry could come
-/// back after its id was forgotten.
-pub const CLIENT_IN_FLIGHT_MAX: usize = 64;
 /// Seconds during which a client retries a request.
 pub const CLIENT_RETRY_S_MAX: u64 = 60;
 
@@ -152,7 +149,8 @@ pub const RECORDS_IN_REPLY_BYTES: usize = 256 * 1024;
 pub const WIRE_DEPTH_MAX: usize = 32;
 
 const _: () = {
-    assert!(CLIENT_IN_FLIGHT_MAX < REQUEST_RING);
+    // A person's requests that are taken and not answered: none is forgotten before its answer.
+    assert!(MAILBOX_MAX + WAITERS_MAX < REQUEST_RING);
     assert!(UTTERANCE_BYTES_MAX < FRAME_BYTES_MAX);
     assert!(SCENE_FILE_BYTES_MAX < FRAME_BYTES_MAX);
     assert!(COMMIT_GROUP_MAX <= COMMIT_QUEUE_MAX);

@@ -2,11 +2,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::client::{PersonAsk, Response};
-use crate::events::{Batch, Durable, Head, Record};
+use crate::events::{Batch, Head, Record};
 use crate::ids::{Digest, RequestId, Seq, Timestamp};
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::session::Session;
-use crate::store::AppendError;
+use crate::store::{AppendError, Durable};
 use crate::world::Domain;
 
 /// What happened to a person's seat.
@@ -44,8 +44,8 @@ pub enum Effect<D: Domain, C> {
     Append { after: Head, batch: Batch },
     /// Answer a caller. Each caller gets one answer.
     Answer { caller: C, response: Response },
-    /// Read records of the person's stream. [`Input::ReadBack`] follows.
-    ReadBack { first: Seq, last: Seq },
+    /// Read the records of a request from the person's stream. [`Input::ReadBack`] follows.
+    ReadBack { request: RequestId, first: Seq, last: Seq },
     /// Keep a mind in memory, where [`Effect::FindMind`] looks.
     Remember(Arc<Mind>),
     /// Find a mind. [`Input::Found`] follows.

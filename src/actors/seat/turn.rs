@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::{Effect, Seat, Stage};
 use crate::actors::defect::defect;
 use crate::client::{ErrorCode, Phase, Reply, Response, Told, Waited};
-use crate::events::{Durable, Record, Report};
+use crate::events::{Record, Report};
 use crate::ids::{Digest, RequestId, Timestamp};
 use crate::learning::{self, Mind};
 use crate::sabotage;
 use crate::session::{Command, Divergence, Proposed, Session, Turn};
-use crate::store::AppendError;
+use crate::store::{AppendError, Durable};
 use crate::world::Domain;
 
 /// A command to carry out.
@@ -67,7 +67,7 @@ impl<D: Domain, C> Seat<D, C> {
             Ok(Ok(Proposed::Turn(_))) if is_new => self.open(work, fresh),
             Ok(Ok(Proposed::Turn(turn))) => self.append(turn, Doing::Appending(work)),
             Ok(Ok(Proposed::Repeat { first, last })) => {
-                self.effects.push(Effect::ReadBack { first, last });
+                self.effects.push(Effect::ReadBack { request: work.request, first, last });
                 self.doing = Some(Doing::ReadingBack(work));
             }
             Ok(Ok(Proposed::Defect(divergence))) => {
@@ -297,7 +297,8 @@ impl<D: Domain, C> Seat<D, C> {
 
     /// The records contradict the state. A new seat reads them from the log.
     fn disagrees(&mut self, caller: Option<C>, divergence: &Divergence) {
-        tracing::error!(stream = %self.stream, %divergence, "binary and log disagree");
+        let law = divergence.law().map(tracing::field::display);
+        tracing::error!(stream = %self.stream, law, %divergence, "binary and log disagree");
         self.answer(caller, Response::error(ErrorCode::Internal, divergence.to_string()));
         self.leave();
     }

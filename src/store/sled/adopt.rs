@@ -2,19 +2,19 @@ use std::fs::OpenOptions;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::super::closed::{ClosedMark, Part};
-use super::super::files::sync_dir;
-use super::super::quiet::guarded;
+use super::quiet::guarded;
 use super::read::{chunk_key, chunks};
 use super::{CACHE_BYTES, TREE_PREFIX, open_database};
 use crate::events::Head;
 use crate::ids::{StreamId, TenantId};
 use crate::limits::COMMIT_GROUP_BYTES_MAX;
-use crate::store::heads::{Heads, HeadsFile};
+use crate::store::disk::closed::{ClosedMark, Part};
+use crate::store::disk::files::sync_dir;
+use crate::store::log::heads::{Heads, HeadsFile};
 
 /// Puts records that were sealed elsewhere into the log of a directory that nobody has open. Nothing
 /// counts before [`Adopter::finish`].
-pub(in super::super) struct Adopter {
+pub(in crate::store) struct Adopter {
     db: ::sled::Db,
     dir: PathBuf,
     heads: Heads,
@@ -27,7 +27,7 @@ type Done<T> = Result<T, String>;
 
 impl Adopter {
     /// The caller holds the directory's lock.
-    pub(in super::super) fn open(dir: &Path) -> Done<Adopter> {
+    pub(in crate::store) fn open(dir: &Path) -> Done<Adopter> {
         Part::Log.lift_mark(dir).map_err(text)?;
         let read = HeadsFile::read(&dir.join("HEADS")).map_err(text)?;
         let heads = match read {
@@ -42,12 +42,12 @@ impl Adopter {
         Ok(Adopter { db, dir, heads, batch, batch_of: None, batch_bytes: 0 })
     }
 
-    pub(in super::super) fn holds(&self, tenant: &TenantId) -> bool {
+    pub(in crate::store) fn holds(&self, tenant: &TenantId) -> bool {
         self.heads.contains_key(tenant)
     }
 
     /// Puts a record whose place in its chain the caller has proved.
-    pub(in super::super) fn put(
+    pub(in crate::store) fn put(
         &mut self,
         stream: &StreamId,
         head: Head,
@@ -76,14 +76,14 @@ impl Adopter {
     }
 
     /// Takes back what was put for a tenant and never finished.
-    pub(in super::super) fn forget(&mut self, tenant: &TenantId) -> Done<()> {
+    pub(in crate::store) fn forget(&mut self, tenant: &TenantId) -> Done<()> {
         self.heads.remove(tenant);
         let name = format!("{TREE_PREFIX}{tenant}");
         guarded(|| self.db.drop_tree(name))?.map_err(text).map(|_| ())
     }
 
     /// Makes all of it durable, the heads last: with them it counts.
-    pub(in super::super) fn finish(mut self) -> Done<()> {
+    pub(in crate::store) fn finish(mut self) -> Done<()> {
         self.write()?;
         guarded(|| self.db.flush())?.map_err(text)?;
         let database = self.dir.join("log");

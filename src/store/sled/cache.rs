@@ -2,18 +2,18 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::cache::{Cache, Cached};
-use super::super::closed::{ClosedMark, Part};
-use super::super::lock::DirLock;
-use super::super::quiet::guarded;
 use super::open_database;
+use super::quiet::guarded;
+use crate::store::caches::cache::{Cache, Cached};
+use crate::store::disk::closed::{ClosedMark, Part};
+use crate::store::disk::lock::DirLock;
 
 /// Bytes of pages kept in memory.
 const CACHE_BYTES: u64 = 16 * 1024 * 1024;
 
 /// The caches on disk: a database of their own, so that a damaged cache is thrown away whole and
 /// the log's database holds nothing but the log. Never synced by us.
-pub(in super::super) struct SledCache {
+pub(in crate::store) struct SledCache {
     db: ::sled::Db,
     /// Left when the database is closed: fields are dropped in this order.
     _mark: ClosedMark,
@@ -23,7 +23,7 @@ pub(in super::super) struct SledCache {
 
 impl SledCache {
     /// Opens the cache in `dir`; one that does not open is replaced by an empty one.
-    pub(in super::super) fn open(dir: &Path, lock: Arc<DirLock>) -> Result<SledCache, String> {
+    pub(in crate::store) fn open(dir: &Path, lock: Arc<DirLock>) -> Result<SledCache, String> {
         let db = open_database(dir, CACHE_BYTES).or_else(|reason| {
             tracing::warn!(%reason, "the cache of minds and snapshots is damaged and is emptied");
             if dir.exists() {
@@ -38,7 +38,7 @@ impl SledCache {
 
 impl SledCache {
     /// Forgets every shelf whose name begins with `begin`.
-    pub(in super::super) fn drop_shelves(&self, begin: &str) -> Cached<()> {
+    pub(in crate::store) fn drop_shelves(&self, begin: &str) -> Cached<()> {
         let dropped = guarded(|| {
             let names = self.db.tree_names();
             for name in names.iter().filter(|name| name.starts_with(begin.as_bytes())) {
@@ -49,7 +49,7 @@ impl SledCache {
         dropped.map_err(|error: ::sled::Error| error.to_string())
     }
 
-    pub(in super::super) fn flush(&self) -> Cached<()> {
+    pub(in crate::store) fn flush(&self) -> Cached<()> {
         let flushed = guarded(|| self.db.flush())?;
         flushed.map(|_| ()).map_err(|error| error.to_string())
     }

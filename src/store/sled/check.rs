@@ -1,16 +1,16 @@
 use std::path::Path;
 
-use super::super::quiet::guarded;
+use super::quiet::guarded;
 use super::read::walk;
 use super::{CACHE_BYTES, Damage, LogError, TREE_PREFIX, acknowledged, compare, open_database};
 use crate::ids::StreamId;
-use crate::store::heads::HeadsFile;
+use crate::store::log::heads::HeadsFile;
 
 /// Opens the database of `dir` and reads every record of it, without any key. It may write there:
 /// only for copies.
 ///
 /// - errors: the first damage of each stream, or why the database does not open at all.
-pub(in super::super) fn check_log(dir: &Path) -> Result<(), LogError> {
+pub(in crate::store) fn check_log(dir: &Path) -> Result<(), LogError> {
     let database = dir.join("log");
     if !database.join("db").is_file() {
         return Err(LogError::Database("its file log/db is missing".to_owned()));
@@ -41,7 +41,7 @@ pub(in super::super) fn check_log(dir: &Path) -> Result<(), LogError> {
 }
 
 /// Opens a cache and reads every value of it. Only for copies.
-pub(in super::super) fn check_cache(path: &Path) -> Result<(), String> {
+pub(in crate::store) fn check_cache(path: &Path) -> Result<(), String> {
     let db = open_database(path, CACHE_BYTES)?;
     guarded(|| {
         for name in db.tree_names() {

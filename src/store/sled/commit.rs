@@ -4,16 +4,17 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use super::Shared;
+use super::quiet::guarded;
 use super::read::{chunk_key, chunks};
-use crate::events::{Durable, Head};
-use crate::fairness::Turns;
+use crate::events::Head;
+use crate::fairness::FairQueue;
 use crate::ids::{StreamId, TenantId};
 use crate::limits::{COMMIT_GROUP_BYTES_MAX, COMMIT_GROUP_MAX};
 use crate::sabotage;
-use crate::store::heads::HeadsFile;
-use crate::store::log::Promise;
-use crate::store::quiet::guarded;
-use crate::store::{AppendError, Draft, checks};
+use crate::store::checks;
+use crate::store::log::heads::HeadsFile;
+use crate::store::log::{AppendError, Durable, Promise};
+use crate::store::sealing::seal::Draft;
 
 type Answer = Result<Durable, AppendError>;
 
@@ -30,7 +31,7 @@ pub(super) struct Job {
 
 impl Job {
     pub(super) fn answer(self, answer: Answer) {
-        // Whoever asked may have gone; the log does not mind.
+        // The caller may have gone; the log goes on.
         let _ = self.promise.send(answer);
     }
 }
@@ -42,9 +43,9 @@ pub(super) struct Committer {
     sync: Syncer,
 }
 
-fn queue(turns: &mut Turns<Job>, job: Job) {
+fn enqueue(queue: &mut FairQueue<Job>, job: Job) {
     let tenant = job.stream.tenant.clone();
-    turns.push(&tenant, job);
+    queue.push(&tenant, job);
 }
 
 /// What one group will have done once it is durable.
@@ -64,16 +65,16 @@ impl Committer {
     /// Commits until the log is dropped.
     pub(super) fn run(mut self, jobs: &Receiver<Job>) {
         // Tenants take turns: one that has thousands of batches waiting fills no group alone.
-        let mut turns = Turns::default();
+        let mut queue = FairQueue::default();
         loop {
-            if turns.is_empty() {
+            if queue.is_empty() {
                 let Ok(first) = jobs.recv() else { return };
-                queue(&mut turns, first);
+                enqueue(&mut queue, first);
             }
-            jobs.try_iter().for_each(|job| queue(&mut turns, job));
+            jobs.try_iter().for_each(|job| enqueue(&mut queue, job));
             let (mut group, mut bytes) = (Vec::new(), 0);
             while group.len() < COMMIT_GROUP_MAX && bytes < COMMIT_GROUP_BYTES_MAX {
-                let Some(job) = turns.pop() else { break };
+                let Some(job) = queue.pop() else { break };
                 bytes += job.draft.bytes();
                 self.shared.waiting.remove(&job.stream.tenant, job.draft.bytes());
                 group.push(job);

@@ -1,15 +1,15 @@
-use super::super::log::ReadError;
-use super::super::quiet::guarded;
-use super::super::{DataKey, SealedRecord, Walk};
+use super::quiet::guarded;
 use super::sentence;
 use crate::events::{Head, Record};
 use crate::ids::{Digest, Seq, StreamKey};
 use crate::limits::STORE_VALUE_BYTES_MAX;
+use crate::store::log::{ReadError, SealedRecord};
+use crate::store::sealing::seal::{DataKey, Walk};
 
 /// stream key (16) ‖ sequence number (8) ‖ chunk (2), big-endian.
-pub(in super::super) const KEY_BYTES: usize = 16 + 8 + 2;
+pub(in crate::store) const KEY_BYTES: usize = 16 + 8 + 2;
 
-pub(in super::super) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
+pub(in crate::store) fn chunk_key(stream: StreamKey, seq: u64, chunk: u16) -> [u8; KEY_BYTES] {
     let mut key = [0; KEY_BYTES];
     key[..16].copy_from_slice(&stream.0);
     key[16..24].copy_from_slice(&seq.to_be_bytes());

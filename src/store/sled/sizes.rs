@@ -1,13 +1,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
+use super::quiet::guarded;
 use super::read::parse_key;
 use super::{sentence, store_error};
 use crate::ids::TenantId;
 use crate::limits::KEY_FILE_BYTES;
-use crate::store::ReadError;
-use crate::store::heads::Heads;
-use crate::store::quiet::guarded;
+use crate::store::log::ReadError;
+use crate::store::log::heads::Heads;
 
 /// How much each tenant has in the log. What was there at opening is counted when somebody asks
 /// for the first time; what comes after that is added as it comes.

@@ -6,9 +6,12 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::super::conformance::{batch, read_all, stream};
-use super::super::{OpenError, OsEntropy, Store, open};
 use super::*;
+use crate::store::directory::error::OpenError;
+use crate::store::directory::open::open;
+use crate::store::directory::store::Store;
+use crate::store::sealing::entropy::OsEntropy;
+use crate::store::testing::conformance::{batch, read_all, stream};
 
 /// Longer than any group takes that does not hang.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -126,7 +129,7 @@ fn a_directory_whose_making_was_cut_short_is_made_anew() {
     let store = open(dir.path()).unwrap();
     fill(&store, &ada(&store), 3);
     drop(store);
-    // It is not made anew when the heads know of records.
+    // It is not made again when the heads know of records.
     fs::write(dir.path().join("CREATING"), "").unwrap();
     let store = open(dir.path()).unwrap();
     assert_eq!(store.log.head(&ada(&store)).unwrap().seq, 3);

@@ -1,8 +1,8 @@
 //! Notices a commit that does not come to its end.
 //!
 //! When a write of `sled` 0.34.7 fails that it had left to one of its own threads (a full buffer that
-//! still had writers), that thread sets an error and wakes nobody: a flush that waits for the write
-//! waits for ever. Nobody must wait with it.
+//! still had writers), that thread sets an error and wakes nobody. A flush that waits for the write
+//! then never returns. Nothing else may wait for it.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
@@ -11,10 +11,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::Shared;
-use crate::store::AppendError;
-use crate::store::log::Promise;
+use crate::store::log::{AppendError, Promise};
 
-/// The promises of the group that is being made durable. Whoever takes them out answers them.
+/// The promises of the group that is being made durable. The one that takes them out answers them.
 #[derive(Default)]
 pub(super) struct InHand(Mutex<Option<Group>>);
 

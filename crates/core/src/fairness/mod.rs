@@ -2,11 +2,11 @@
 //! tokens fills. Pure: times are given, and the same calls give the same answers.
 
 mod bucket;
+mod fair_queue;
 mod room;
 mod trainings;
-mod turns;
 
 pub use bucket::{Bucket, TOKEN};
+pub use fair_queue::FairQueue;
 pub use room::Room;
 pub use trainings::Trainings;
-pub use turns::Turns;

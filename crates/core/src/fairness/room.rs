@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 
 use crate::ids::TenantId;
+use crate::invariants::Invariant;
 
 /// Room that tenants share, none of whom may take what others need: a tenant may take as much as
 /// it leaves free. One alone gets `most`, which is half of what there is; of two that want all,
@@ -32,7 +33,11 @@ impl Room {
     }
 
     /// Gives back what was taken.
+    ///
+    /// - panics: with assertions on, when less was taken; the room would then have no bound.
     pub fn give_back(&mut self, tenant: &TenantId, amount: usize) {
+        let (law, held) = (Invariant::Bounded, self.held_by(tenant));
+        debug_assert!(amount <= held, "{law}: {tenant} gives back {amount} of {held}");
         self.total = self.total.saturating_sub(amount);
         if let Some(held) = self.held.get_mut(tenant) {
             *held = held.saturating_sub(amount);
@@ -91,6 +96,15 @@ mod tests {
         assert!(room.take(&tenant(1), 8) && room.take(&tenant(1), 8));
         room.give_back(&tenant(0), 60);
         assert_eq!(room.total(), 16);
+    }
+
+    #[cfg(debug_assertions)]
+    #[test]
+    #[should_panic(expected = "Bounded")]
+    fn more_than_was_taken_is_not_given_back() {
+        let mut room = Room::new(64);
+        assert!(room.take(&tenant(0), 2) && room.take(&tenant(1), 8));
+        room.give_back(&tenant(0), 3);
     }
 
     #[test]
