@@ -27,7 +27,7 @@ impl Dice {
     }
 
     /// Draws any number.
-    pub fn next(&mut self) -> u64 {
+    pub fn number(&mut self) -> u64 {
         self.0.next_u64()
     }
 

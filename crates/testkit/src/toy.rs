@@ -75,6 +75,12 @@ fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
     pairs.iter().map(exemplar).collect()
 }
 
+impl Default for Bells {
+    fn default() -> Bells {
+        Bells::new()
+    }
+}
+
 impl Bells {
     /// A world in which training a reranker panics.
     pub fn brittle() -> Bells {
