@@ -6,20 +6,18 @@
 //! a quota for the flooding lab. The other has none: then only the turns between labs limit it.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
-use apprentice::client::{
-    Ask, Client, Command, Context, CurveKey, Identity, PersonAsk, Response, fresh_id,
-};
-use apprentice::ids::{PublicKey, TenantId, UserId};
+use apprentice::client::{Ask, Client, Command, CurveKey, PersonAsk, Response, fresh_id};
 use apprentice::service::{Config, Data, Service};
 use apprentice::tenancy::{Order, Quotas, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use apprentice_testkit::lab::{self, FREE_PORT};
 
 /// Utterances a second of the quiet lab.
 const QUIET: u64 = 20;
@@ -32,8 +30,8 @@ const STRETCH: Duration = Duration::from_secs(3);
 /// Utterances of one episode.
 const EPISODE: usize = 200;
 
-fn user(number: usize) -> UserId {
-    UserId::new(&format!("person {number}")).expect("a good name")
+fn person(number: usize) -> String {
+    format!("person {number}")
 }
 
 fn stage() -> Stage {
@@ -47,26 +45,8 @@ fn saying(index: usize) -> String {
 fn start(directory: &Path) -> Service {
     let data = Data::Directory(directory.to_owned());
     let mut config = Config::new(Arc::new(Household::new()), data);
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+    config.listen_curve = vec![FREE_PORT.to_owned()];
     Service::start(config).expect("the service starts")
-}
-
-fn obey(service: &Service, lab: &TenantId, order: Order) {
-    let (sender, receiver) = mpsc::channel();
-    let answer = move |obeyed| sender.send(obeyed).expect("somebody waits");
-    service.registrar().order(lab.clone(), order, answer);
-    receiver.recv().expect("an answer").expect("it is obeyed");
-}
-
-fn admit(service: &Service, lab: &TenantId, key: PublicKey) {
-    let label = "a benchmark".to_owned();
-    obey(service, lab, Order::Admit { key, role: Role::Gateway, label });
-}
-
-fn connect(service: &Service, key: &CurveKey, number: usize) -> Client {
-    let identity = Identity { key: key.clone(), server: *service.server_key().expect("a key") };
-    let endpoint = &service.curve_endpoints()[0];
-    Client::connect_as(endpoint, user(number), identity).expect("it connects")
 }
 
 /// Sends at its full rate while it is switched on, and does not wait for answers.
@@ -79,15 +59,9 @@ struct Flood {
 }
 
 impl Flood {
-    fn run(&self, service: &Service, pair: &zmq::CurveKeyPair) {
-        let context = Context::new();
-        let socket = context.socket(zmq::DEALER).expect("a socket");
-        socket.set_linger(0).expect("an option");
+    fn run(&self, service: &Service, key: &CurveKey) {
+        let socket = lab::socket(service, key, zmq::DEALER);
         socket.set_sndhwm(100_000).expect("an option");
-        socket.set_curve_publickey(&pair.public_key).expect("an option");
-        socket.set_curve_secretkey(&pair.secret_key).expect("an option");
-        let server = service.server_key().expect("a key");
-        socket.set_curve_serverkey(&server.0).expect("an option");
         socket.connect(&service.curve_endpoints()[0]).expect("it connects");
         let (mut index, mut start, mut due) = (0, Instant::now(), 0);
         while !self.over.load(Ordering::Relaxed) {
@@ -97,7 +71,7 @@ impl Flood {
             let wanted = start.elapsed().as_micros() as u64 * QUIET * TIMES / 1_000_000;
             while due < wanted {
                 due += 1;
-                let (person, turn) = (index % CROWD, index / CROWD % EPISODE);
+                let (user, turn) = (lab::user(&person(index % CROWD)), index / CROWD % EPISODE);
                 let command = match turn {
                     0 => Command::Done,
                     1 => Command::StartEpisode { stage: stage() },
@@ -105,7 +79,7 @@ impl Flood {
                 };
                 index += 1;
                 let ask = Ask::Person(PersonAsk::Command(command));
-                let bytes = encode_request(&Request { id: fresh_id(), user: user(person), ask });
+                let bytes = encode_request(&Request { id: fresh_id(), user, ask });
                 if socket.send(bytes, zmq::DONTWAIT).is_ok() {
                     self.sent.fetch_add(1, Ordering::Relaxed);
                 }
@@ -152,30 +126,24 @@ fn percentile(times: &mut [Duration], percent: usize) -> f64 {
 
 fn measure(service: &Service, name: &str, quotas: Quotas) {
     let (quiet, flood) = (format!("quiet-{name}"), format!("flood-{name}"));
-    let [quiet, flood] = [quiet, flood].map(|lab| TenantId::new(&lab).expect("a good name"));
-    let [quiet_key, flood_key] = [&quiet, &flood].map(|lab| {
-        let key = CurveKey::new().expect("a key");
-        obey(service, lab, Order::Open);
-        admit(service, lab, *key.public());
-        key
-    });
-    let pair = zmq::CurveKeyPair::new().expect("a key");
-    admit(service, &flood, PublicKey(pair.public_key));
+    let [quiet_key, flood_key, key] =
+        [&quiet, &flood, &flood].map(|lab| lab::admit(service, lab, Role::Gateway));
     for number in 0..CROWD {
-        connect(service, &flood_key, number).start(stage()).expect("an episode starts");
+        let client = lab::connect(service, &flood_key, &person(number));
+        client.start(stage()).expect("an episode starts");
     }
-    obey(service, &flood, Order::SetQuotas(quotas));
+    lab::order(service, &flood, Order::SetQuotas(quotas));
     let state = Flood {
         on: AtomicBool::new(false),
         over: AtomicBool::new(false),
         sent: AtomicUsize::new(0),
         heard: Default::default(),
     };
-    let client = connect(service, &quiet_key, 0);
+    let client = lab::connect(service, &quiet_key, &person(0));
     let (mut said, mut alone, mut beside) = (0, Vec::new(), Vec::new());
     talk(&client, &mut said, &mut Vec::new());
     thread::scope(|scope| {
-        scope.spawn(|| state.run(service, &pair));
+        scope.spawn(|| state.run(service, &key));
         for _ in 0..ROUNDS {
             talk(&client, &mut said, &mut alone);
             state.on.store(true, Ordering::Relaxed);

@@ -1,16 +1,17 @@
-//! `apprentice`: a language interface that each person teaches by breaking hard utterances into
-//! easy ones, and a service that can prove what it learned.
+//! `apprentice`: a language interface that each person teaches, by doing in small steps what it did
+//! not understand; and a service that can prove what it learned.
 //!
-//! **State is a fold over the log. A mind is a pure function of the state.** Everything else is
-//! plumbing: [`session`] decides and applies, [`learning`] trains, [`store`] keeps, [`actors`] and
-//! [`frontends`] carry. `ARCHITECTURE.md` is the map; its two tables are checked by
-//! `tests/tidy/`. Rooms below stand in storeys: imports point upwards on this list only.
+//! **State is a fold over the log. A mind is a pure function of the state.** [`session`] decides
+//! and applies, [`learning`] trains, [`store`] keeps the records, [`actors`] and [`frontends`]
+//! carry requests and answers, and [`service`] builds all of it. `ARCHITECTURE.md` says which
+//! module may import which; `tests/tidy/` checks it. The modules below stand in the order of these
+//! layers: each imports only from those above it.
 
 pub use apprentice_client as client;
 pub use apprentice_core::{fairness, ids, invariants, language, limits, numerics, plain, sabotage};
 pub use apprentice_mind::{grounding, learning, parser};
 
-/// Where programs act: the trait of a world, and the worlds that there are.
+/// Where programs run: the trait of a world, and the worlds that exist.
 pub mod world {
     pub use apprentice_core::world::*;
     pub use apprentice_household as household;

@@ -1,4 +1,4 @@
-//! What the log holds, for auditors and operators: read apart from the actors, and by turns.
+//! Reads the log for auditors and operators, on a thread of its own. Tenants take turns.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -18,7 +18,7 @@ use crate::limits::{
 use crate::replay;
 use crate::store::{EventLog, ReadError};
 
-/// Reads what is durable. Blocks.
+/// Reads durable records. All its methods block.
 #[derive(Clone)]
 pub struct ArchiveReader {
     log: Arc<dyn EventLog>,
@@ -35,6 +35,11 @@ impl ArchiveReader {
         ArchiveReader { log }
     }
 
+    /// Where the streams of a tenant end, in the order of their keys.
+    ///
+    /// - `after`: only streams with a greater key.
+    /// - `limit`: streams; the reader gives at most [`HEADS_IN_REPLY_MAX`].
+    /// - errors: the log cannot be read.
     pub fn heads(
         &self,
         tenant: &TenantId,
@@ -54,7 +59,11 @@ impl ArchiveReader {
         Ok(Heads { heads, more })
     }
 
-    /// At least one record, if there is one; no more than fit a reply.
+    /// Encrypted records of a stream: at least one, if there is one, and no more than a reply may
+    /// have.
+    ///
+    /// - `limit`: records; the reader gives at most [`RECORDS_IN_REPLY_MAX`].
+    /// - errors: the log cannot be read.
     pub fn sealed(
         &self,
         stream: &StreamId,
@@ -79,7 +88,7 @@ impl ArchiveReader {
         Ok(SealedRecords { records, more: false })
     }
 
-    /// As [`ArchiveReader::sealed`], opened.
+    /// As [`ArchiveReader::sealed`], decrypted.
     pub fn plain(
         &self,
         stream: &StreamId,
@@ -128,8 +137,8 @@ impl ArchiveReader {
     }
 }
 
-/// A thread that answers questions about the log. Those of one tenant wait behind their own, not
-/// others' behind theirs.
+/// A thread that answers questions about the log. Each tenant has its own queue, so the questions
+/// of one tenant do not delay those of another.
 #[derive(Clone)]
 pub(super) struct Archive(Arc<Questions>);
 
@@ -152,7 +161,9 @@ struct QuestionQueue {
 }
 
 impl Archive {
-    /// - `open`: ends when the thread has let go of the log.
+    /// Starts the thread.
+    ///
+    /// - `open`: dropped when the thread no longer uses the log.
     pub fn start(reader: ArchiveReader, open: Awake) -> std::io::Result<Archive> {
         let room = Room::new(ARCHIVE_QUEUE_MAX);
         let waiting =
@@ -169,7 +180,10 @@ impl Archive {
         Ok(Archive(questions))
     }
 
-    /// - errors: the way back, when the tenant has too many here already, or nobody answers.
+    /// Queues a question.
+    ///
+    /// - errors: the question cannot be answered, because the tenant has too many in the queue or
+    ///   the archive is closed. Answer it in another way.
     pub fn ask(&self, question: Question) -> Result<(), AnswerTo> {
         let mut waiting = self.0.waiting();
         if waiting.closed || !waiting.room.take(&question.tenant, 1) {
@@ -181,7 +195,7 @@ impl Archive {
         Ok(())
     }
 
-    /// Answers nobody any more. What waits is told to ask again.
+    /// Answers no more questions. The callers in the queue are told to ask again.
     pub fn close(&self) {
         let mut waiting = self.0.waiting();
         waiting.closed = true;

@@ -1,31 +1,34 @@
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// How many actors of people there are, the ones just falling asleep included.
+/// Counts what is in use: the actors of people, also those that are going to sleep; or the parts of
+/// the service that use the store.
 #[derive(Debug, Default)]
 pub(super) struct AwakeCount {
     count: Mutex<usize>,
     fewer: Condvar,
 }
 
-/// One actor. Ends when dropped.
+/// One that is counted, until it is dropped.
 #[derive(Debug)]
 pub(super) struct Awake(Arc<AwakeCount>);
 
 impl AwakeCount {
+    /// Counts one more.
     pub fn enter(self: &Arc<Self>) -> Awake {
         *self.count.lock().unwrap_or_else(PoisonError::into_inner) += 1;
         Awake(self.clone())
     }
 
+    /// The count at this moment.
     pub fn now(&self) -> usize {
         *self.count.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Blocks until nobody is awake, or `limit` has passed.
+    /// Blocks until the count is 0, or `limit` has passed.
     ///
-    /// - returns: whether everybody sleeps.
-    pub fn wait_for_silence(&self, limit: Duration) -> bool {
+    /// - returns: true if the count is 0.
+    pub fn wait_for_none(&self, limit: Duration) -> bool {
         let count = self.count.lock().unwrap_or_else(PoisonError::into_inner);
         let result = self.fewer.wait_timeout_while(count, limit, |count| *count > 0);
         *result.unwrap_or_else(PoisonError::into_inner).0 == 0

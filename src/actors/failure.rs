@@ -1,8 +1,8 @@
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The one place where the parts of the service say that it must not go on: the log is poisoned,
-/// or a thread that everybody depends on is gone. The first reason stays.
+/// Where the parts of the service report that it must stop: the log is poisoned, or a thread that
+/// all depend on has ended. Only the first reason is kept.
 #[derive(Debug, Clone, Default)]
 pub struct Failure(Arc<Inner>);
 
@@ -19,7 +19,7 @@ struct State {
 }
 
 impl Failure {
-    /// Says that the service must stop, and why.
+    /// Reports that the service must stop, and why. Nothing after [`Failure::stop_expected`].
     pub fn report(&self, reason: impl Into<String>) {
         let mut state = self.lock();
         if state.reason.is_none() && !state.stopped {
@@ -30,24 +30,25 @@ impl Failure {
         }
     }
 
-    /// Why the service cannot go on, if so.
+    /// Why the service must stop; none if it need not.
     pub fn reason(&self) -> Option<String> {
         self.lock().reason.clone()
     }
 
-    /// A stop that was asked for: threads that end from now on are no failure.
+    /// Notes that a stop was requested. Threads that end from now on are no failure.
     pub fn stop_expected(&self) {
         self.lock().stopped = true;
         self.0.changed.notify_all();
     }
 
+    /// True if a stop was requested.
     pub fn is_stop_expected(&self) -> bool {
         self.lock().stopped
     }
 
-    /// Blocks until the service failed or its stop was asked for, or `limit` has passed.
+    /// Blocks until the service has failed, a stop was requested, or `limit` has passed.
     ///
-    /// - returns: whether one of the two happened.
+    /// - returns: true for a failure or a stop.
     pub fn wait(&self, limit: Duration) -> bool {
         let over = |state: &mut State| state.reason.is_none() && !state.stopped;
         let (state, _) = self
@@ -58,14 +59,14 @@ impl Failure {
         state.reason.is_some() || state.stopped
     }
 
-    // The state is two plain fields: a panic while the lock was held left nothing half done.
+    // A panic while the lock is held leaves nothing half changed: the state is two plain fields.
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Reports a failure when it is dropped, unless a stop was asked for: for the threads that
-/// everybody depends on, however they end.
+/// Reports a failure when it is dropped, unless a stop was requested. A thread that all depend on
+/// owns one, so that its end is noticed, also after a panic.
 #[derive(Debug)]
 pub struct Alarm {
     failure: Failure,
@@ -73,6 +74,7 @@ pub struct Alarm {
 }
 
 impl Failure {
+    /// An alarm with this reason.
     pub fn alarm(&self, reason: &'static str) -> Alarm {
         Alarm { failure: self.clone(), reason }
     }
@@ -99,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_that_was_asked_for_is_no_failure() {
+    fn a_stop_that_was_requested_is_no_failure() {
         let failure = Failure::default();
         assert!(!failure.wait(Duration::ZERO));
         failure.stop_expected();

@@ -12,9 +12,9 @@ use crate::limits::GATEWAY_IN_FLIGHT_MAX;
 use crate::store::EventLog;
 use crate::tenancy::{Admissions, Quotas};
 
-/// What each tenant takes of what all share, held against what it may. Requests are measured where
-/// they come in: who is over a limit hears so at once, from the gateway's thread, and costs the
-/// others nothing more.
+/// Counts what each tenant uses of the service, and compares it with its quotas. The gateway's
+/// thread does this before a request goes to an actor. So a tenant that is over a quota is refused
+/// at once, and costs the other tenants nothing.
 pub(super) struct Meters {
     admissions: Admissions,
     log: Arc<dyn EventLog>,
@@ -24,7 +24,7 @@ pub(super) struct Meters {
     tenants: RwLock<BTreeMap<TenantId, Arc<Meter>>>,
 }
 
-/// One tenant's.
+/// The counts of one tenant.
 #[derive(Default)]
 pub(super) struct Meter {
     bucket: Mutex<Bucket>,
@@ -43,38 +43,45 @@ struct Counts {
     unread: AtomicU64,
 }
 
-/// How often a tenant was turned away since the start, by what it had too much of.
+/// How many requests of a tenant were refused since the start, by the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Refusals {
+    /// Its quota of people awake at the same time.
     pub awake_users: u64,
+    /// Its quota of requests in flight.
     pub in_flight: u64,
+    /// Its quota of utterances in a second.
     pub utterances: u64,
+    /// Its quota of bytes in the log.
     pub sealed_bytes: u64,
-    /// Trainings that had to ask for a place again.
+    /// Trainings that found its queue full. They are asked for again.
     pub trainings: u64,
-    /// Turned away not by a quota, but because all tenants together left no room.
+    /// No quota: all tenants together use all of the service.
     pub busy: u64,
-    /// Answers and messages of the feed that were dropped, because too much waited to be read.
+    /// Answers and messages of the feed that were dropped, because its clients do not read.
     pub unread: u64,
 }
 
-/// What a tenant takes now.
+/// What a tenant uses now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Usage {
+    /// People awake.
     pub awake_users: usize,
+    /// Requests accepted and not yet answered.
     pub in_flight: usize,
+    /// What was refused since the start.
     pub refused: Refusals,
 }
 
-/// A request that was let in. Ends when dropped.
+/// An accepted request. It counts until this is dropped.
 pub(super) struct InFlight {
     meters: Arc<Meters>,
     tenant: TenantId,
 }
 
-/// Milliseconds after which a request may be sent again that met too many others.
+/// Milliseconds after which a request may be sent again if there were too many others.
 const RETRY_CROWD_MS: u32 = 200;
-/// Millionths of a token that a query takes: it records nothing.
+/// What a query costs, in millionths of a token: a tenth, because it records nothing.
 const QUERY_COST: u64 = TOKEN / 10;
 
 impl Meters {
@@ -83,10 +90,10 @@ impl Meters {
         Meters { admissions, log, start: Instant::now(), in_flight, tenants: RwLock::default() }
     }
 
-    /// Lets a request in, or says why not.
+    /// Accepts a request, or refuses it.
     ///
-    /// - errors: the answer; [`Response::QuotaExceeded`] for what is the tenant's own limit,
-    ///   [`Response::Busy`] for what is everybody's.
+    /// - errors: the answer: [`Response::QuotaExceeded`] for a limit of the tenant, and
+    ///   [`Response::Busy`] for a limit of the service.
     pub fn admit(
         self: &Arc<Self>,
         tenant: &TenantId,
@@ -112,7 +119,8 @@ impl Meters {
         Ok(in_flight)
     }
 
-    /// Who has used up the room in the log may still ask, withdraw, erase people and take keys back.
+    /// Checks the bytes in the log. A tenant over this quota may still ask queries, withdraw
+    /// people, erase people and retire keys.
     fn check_bytes(
         &self,
         tenant: &TenantId,
@@ -122,7 +130,7 @@ impl Meters {
     ) -> Result<(), Box<Response>> {
         let appends = match ask {
             Ask::Person(PersonAsk::Command(command)) => !matches!(command, Command::Close { .. }),
-            // The host's orders are how a lab gets out of this.
+            // The host's operator must be able to raise the quota.
             Ask::Order(TenantAsk { verb: TenantVerb::Give(order), .. }) => {
                 *tenant != TenantId::local()
                     && matches!(order, Order::Admit { .. } | Order::Rotate { .. })
@@ -130,8 +138,8 @@ impl Meters {
             _ => false,
         };
         let Some(limit) = quotas.sealed_bytes.filter(|_| appends) else { return Ok(()) };
-        // Counted before the quota was made known; an error here is one of reading the log, which
-        // whoever reads or writes it next will say better.
+        // An error means that the log cannot be read. The next reader or writer reports it with
+        // more detail.
         let used = self.log.sealed_bytes(tenant).unwrap_or(0);
         match used >= limit {
             false => Ok(()),
@@ -155,8 +163,9 @@ impl Meters {
             Ask::Person(PersonAsk::Query(_) | PersonAsk::Wait { .. }) | Ask::Archive(_) => {
                 QUERY_COST
             }
-            // Wakes nobody; and an operator must get through when the lab's people do not.
-            Ask::Door(_) | Ask::Order(_) => return Ok(()),
+            // These wake no person. And an operator must be heard while the lab's people are
+            // refused.
+            Ask::Service(_) | Ask::Order(_) => return Ok(()),
         };
         let burst = quotas.burst.unwrap_or(rate);
         let now_us = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
@@ -164,45 +173,47 @@ impl Meters {
         let Err(wait_us) = bucket.take(now_us, rate, burst, cost) else { return Ok(()) };
         drop(bucket);
         let wait_ms = u32::try_from(wait_us.div_ceil(1_000)).ok();
-        // It used up what there was: as many as may go through at once, and a second's worth.
+        // The bucket is empty, so the tenant has used all of its burst.
         let over = over(Quota::Utterances, u64::from(burst), rate.into(), wait_ms);
         Err(count(&meter.refused.utterances, tenant, over))
     }
 
-    /// Says no to one person more who would be awake.
+    /// The refusal when a tenant has too many people awake.
     pub fn refuse_waking(&self, tenant: &TenantId, awake: usize, limit: u32) -> Box<Response> {
         let over = over(Quota::AwakeUsers, awake as u64, limit.into(), Some(RETRY_CROWD_MS));
         count(&self.meter(tenant).refused.awake_users, tenant, over)
     }
 
-    /// Says no to one person more who would be awake: all tenants together left no room.
+    /// The refusal when all tenants together have too many people awake.
     pub fn refuse_crowd(&self, tenant: &TenantId) -> Response {
         self.meter(tenant).refused.busy.fetch_add(1, Ordering::Relaxed);
         let crowd = "everybody who is awake is busy and no one else can be woken";
         Response::busy(crowd, RETRY_CROWD_MS)
     }
 
-    /// Notes that something was not sent, because the tenant's connections do not read.
+    /// Notes that something was dropped, because the tenant's clients do not read.
     pub fn note_unread(&self, tenant: &TenantId) {
         if self.meter(tenant).refused.unread.fetch_add(1, Ordering::Relaxed) == 0 {
             tracing::warn!(%tenant, "a tenant's connections do not read: what they miss is dropped");
         }
     }
 
-    /// Notes that a training found its tenant's queue full.
+    /// Notes that a training found the tenant's queue full.
     pub fn note_training_refused(&self, tenant: &TenantId) {
         self.meter(tenant).refused.trainings.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Notes how many people of a tenant are awake.
     pub fn note_awake(&self, tenant: &TenantId, awake: usize) {
         self.meter(tenant).awake.store(awake, Ordering::Relaxed);
     }
 
+    /// The quotas of a tenant.
     pub fn quotas(&self, tenant: &TenantId) -> Quotas {
         self.admissions.quotas(tenant)
     }
 
-    /// What every tenant takes that has asked for anything since the start.
+    /// What each tenant uses that has sent a request since the start.
     pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
         let tenants = self.tenants.read().unwrap_or_else(PoisonError::into_inner).clone();
         let room = self.room();
@@ -223,7 +234,7 @@ impl Meters {
         })
     }
 
-    // Its methods leave it whole whenever they return.
+    // A panic while the lock is held leaves nothing half changed.
     fn room(&self) -> MutexGuard<'_, Room> {
         self.in_flight.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -250,7 +261,7 @@ impl Counts {
     }
 }
 
-/// Counts a refusal, and says the first of its kind to the operator.
+/// Counts a refusal. The first of each kind goes into the log.
 fn count(counter: &AtomicU64, tenant: &TenantId, over: QuotaExceeded) -> Box<Response> {
     if counter.fetch_add(1, Ordering::Relaxed) == 0 {
         let (quota, limit) = (over.quota, over.limit);
@@ -278,8 +289,8 @@ fn over(quota: Quota, used: u64, limit: u64, retry_after_ms: Option<u32>) -> Quo
 mod tests {
     use super::super::wall_clock;
     use super::*;
-    use crate::client::DoorAsk;
     use crate::client::Query;
+    use crate::client::ServiceAsk;
     use crate::ids::{PublicKey, StreamId, UserId};
     use crate::store::conformance::{batch, stream};
     use crate::store::{Store, open_memory};
@@ -291,7 +302,7 @@ mod tests {
         (Arc::new(Meters::new(admissions, store.log.clone())), lab)
     }
 
-    /// As an operator's order leaves it.
+    /// A tenant after an operator's orders.
     fn standing(quotas: Quotas) -> Standing {
         use crate::events::{QuotasSet, Record, TenantOpened};
         use crate::ids::{Digest, RequestId, Timestamp};
@@ -313,7 +324,7 @@ mod tests {
         match answer.map_err(|response| *response) {
             Err(Response::QuotaExceeded(over)) => over,
             Err(other) => panic!("{other:?}"),
-            Ok(_) => panic!("let in"),
+            Ok(_) => panic!("accepted"),
         }
     }
 
@@ -322,11 +333,11 @@ mod tests {
         let quotas = Quotas { in_flight: Some(2), ..Quotas::default() };
         let (meters, lab) = meters(&open_memory(), quotas);
         let first = meters.admit(&lab, &say()).unwrap();
-        let second = meters.admit(&lab, &Ask::from(DoorAsk::Hello)).unwrap();
+        let second = meters.admit(&lab, &Ask::from(ServiceAsk::Hello)).unwrap();
         let over = refused(meters.admit(&lab, &say()));
         assert_eq!((over.quota, over.used, over.limit), (Quota::InFlight, 2, 2));
         assert_eq!(over.retry_after_ms, Some(RETRY_CROWD_MS));
-        assert!(meters.admit(&TenantId::local(), &say()).is_ok(), "nobody else's business");
+        assert!(meters.admit(&TenantId::local(), &say()).is_ok(), "another tenant is not affected");
         drop(first);
         let third = meters.admit(&lab, &say()).unwrap();
         assert_eq!(meters.usage()[&lab].in_flight, 2);
@@ -348,8 +359,8 @@ mod tests {
         let over = refused(meters.admit(&lab, &say()));
         assert_eq!((over.quota, over.limit), (Quota::Utterances, 1));
         assert!(over.retry_after_ms.is_some_and(|ms| (1..=1_000).contains(&ms)), "{over:?}");
-        assert!(meters.admit(&lab, &Ask::from(DoorAsk::Hello)).is_ok());
-        assert_eq!(meters.usage()[&lab].in_flight, 0, "who is refused holds no place");
+        assert!(meters.admit(&lab, &Ask::from(ServiceAsk::Hello)).is_ok());
+        assert_eq!(meters.usage()[&lab].in_flight, 0, "a refused request does not count");
     }
 
     #[test]
@@ -389,12 +400,12 @@ mod tests {
     }
 
     #[test]
-    fn without_quotas_one_tenant_gets_what_the_service_has_and_another_still_comes_in() {
+    fn without_quotas_one_tenant_gets_what_the_service_has_and_another_is_still_accepted() {
         let (meters, lab) = meters(&open_memory(), Quotas::default());
         let held: Vec<_> =
-            std::iter::from_fn(|| meters.admit(&lab, &Ask::from(DoorAsk::Hello)).ok()).collect();
+            std::iter::from_fn(|| meters.admit(&lab, &Ask::from(ServiceAsk::Hello)).ok()).collect();
         assert_eq!(held.len(), GATEWAY_IN_FLIGHT_MAX);
-        let busy = meters.admit(&lab, &Ask::from(DoorAsk::Hello)).map_err(|response| *response);
+        let busy = meters.admit(&lab, &Ask::from(ServiceAsk::Hello)).map_err(|response| *response);
         assert!(matches!(busy, Err(Response::Busy(_))));
         assert!(meters.admit(&TenantId::local(), &say()).is_ok());
         assert_eq!(meters.usage()[&lab].refused.busy, 2);

@@ -1,6 +1,6 @@
-//! Who is awake: one mailbox for each person, one pool of trainers, one directory for all. What
-//! they decide stands in `seat/`, `directory/` and `registrar/`, without actix; the actors carry it
-//! out.
+//! The actors: one for each person who is awake, a pool of trainers, and one directory that knows
+//! who is awake. All decisions are in `seat/`, `directory/` and `registrar/`, without actix. The
+//! actors carry them out.
 
 mod archive;
 mod awake;

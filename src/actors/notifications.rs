@@ -7,22 +7,24 @@ use crate::ids::{Seq, StreamId, TenantId};
 use crate::limits::NOTIFICATIONS_WAITING_MAX;
 use crate::store::Durable;
 
-/// What became durable, for whoever publishes it: places in the log, no content. Noting costs the
-/// writer a lock and no I/O. What finds the queue full is counted and left out; nobody waits.
+/// A bounded queue of commit notifications (stream and sequence, no content) for the feed. A writer
+/// takes a lock and does no I/O. If the queue is full, the notification is dropped and counted, and
+/// the writer does not wait.
 #[derive(Clone, Default)]
 pub struct CommitNotifications(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
     waiting: Mutex<NotificationQueue>,
-    /// Nobody listens until this is set; nothing is kept until then.
+    /// Wakes the listener. Notifications are dropped until this is set.
     wake: OnceLock<Box<dyn Fn() + Send + Sync>>,
 }
 
+/// What waits for the listener.
 struct NotificationQueue {
     queue: FairQueue<CommitNotification>,
     room: Room,
-    /// Records noted for each tenant, the ones left out included.
+    /// Records noted for each tenant, also those whose notification was dropped.
     numbers: BTreeMap<TenantId, u64>,
     left_out: u64,
 }
@@ -30,11 +32,14 @@ struct NotificationQueue {
 /// The records `first` to `last` of a stream are durable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CommitNotification {
+    /// The stream.
     pub stream: StreamId,
+    /// The first of the records.
     pub first: Seq,
+    /// The last of the records.
     pub last: Seq,
-    /// The place of `first` among all records that were noted for this tenant, from 1 on: whoever
-    /// sees a number missing has missed records.
+    /// The number of `first` among all records that were noted for this tenant, from 1. A missing
+    /// number means missed records.
     pub number: u64,
 }
 
@@ -51,12 +56,12 @@ impl Default for NotificationQueue {
 }
 
 impl CommitNotifications {
-    /// From now on what grows is kept, and `wake` is called for each.
+    /// Keeps notifications from now on, and calls `wake` for each. Only the first call counts.
     pub fn listen(&self, wake: impl Fn() + Send + Sync + 'static) {
         let _ = self.0.wake.set(Box::new(wake));
     }
 
-    /// Must be called after the records are durable, in the order of the stream.
+    /// Notes new records. Call it after they are durable, in the order of the stream.
     pub(super) fn note(&self, stream: &StreamId, durable: &Durable) {
         let Some(wake) = self.0.wake.get() else { return };
         let records = durable.records();
@@ -81,7 +86,7 @@ impl CommitNotifications {
         wake();
     }
 
-    /// The next notification; tenants take turns.
+    /// The next notification; none if the queue is empty. Tenants take turns.
     pub fn next(&self) -> Option<CommitNotification> {
         let mut waiting = self.waiting();
         let notification = waiting.queue.pop()?;
@@ -89,13 +94,13 @@ impl CommitNotifications {
         Some(notification)
     }
 
-    /// How many records were noted for each tenant; none while some of them are still to be taken.
+    /// How many records were noted for each tenant; none while the queue is not empty.
     pub fn all_taken(&self) -> Option<BTreeMap<TenantId, u64>> {
         let waiting = self.waiting();
         waiting.queue.is_empty().then(|| waiting.numbers.clone())
     }
 
-    /// Records that found the queue full.
+    /// Records whose notification was dropped, because the queue was full.
     pub fn left_out(&self) -> u64 {
         self.waiting().left_out
     }

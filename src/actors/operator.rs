@@ -4,7 +4,7 @@ use crate::ids::TenantId;
 use crate::store::AppendError;
 use crate::tenancy::{Admissions, Standing};
 
-/// Milliseconds after which an order may be sent again that found too many before it.
+/// Milliseconds after which an order may be sent again if there were too many others.
 const RETRY_BUSY_MS: u32 = 200;
 
 fn view(tenant: TenantId, standing: &Standing) -> TenantView {
@@ -24,7 +24,7 @@ fn view(tenant: TenantId, standing: &Standing) -> TenantView {
     }
 }
 
-/// One tenant, or all of them in the order of their names.
+/// What operators see of one tenant, or of all tenants in the order of their names.
 pub fn list_tenants(admissions: &Admissions, only: Option<&TenantId>) -> Vec<TenantView> {
     let wanted = admissions.tenants().into_iter().filter(|tenant| only.is_none_or(|o| o == tenant));
     wanted

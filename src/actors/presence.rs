@@ -1,23 +1,25 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// How much one person's seat has to do: requests not yet answered and trainings not yet ended.
-/// Nobody with something to do is put to sleep.
+/// Counts what one person's seat still has to do: requests that are not answered and trainings that
+/// have not ended. A person is put to sleep only when there is nothing left.
 #[derive(Debug, Clone, Default)]
 pub struct Presence(Arc<AtomicUsize>);
 
 impl Presence {
+    /// Counts one thing more.
     pub fn attend(&self) -> Attention {
         self.0.fetch_add(1, Ordering::SeqCst);
         Attention(self.0.clone())
     }
 
+    /// True if there is nothing to do.
     pub fn is_idle(&self) -> bool {
         self.0.load(Ordering::SeqCst) == 0
     }
 }
 
-/// One thing that a person's seat has to do. Ends when dropped.
+/// One thing that a person's seat has to do. It counts until it is dropped.
 #[derive(Debug)]
 pub struct Attention(Arc<AtomicUsize>);
 

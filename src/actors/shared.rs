@@ -1,4 +1,4 @@
-//! What actors share, and what they do outside the mailbox: waking, training, remembering.
+//! What the actors share, and what they do on other threads: waking, training, keeping minds.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -20,7 +20,7 @@ use crate::session::Session;
 use crate::store::{EventLog, KeyError, Store};
 use crate::world::Domain;
 
-/// What exists before there is an actix system.
+/// What exists before the actix system starts.
 pub(super) struct Common<D: Domain> {
     pub domain: Arc<D>,
     pub store: Store,
@@ -29,11 +29,11 @@ pub(super) struct Common<D: Domain> {
     pub meters: Arc<Meters>,
     pub notifications: CommitNotifications,
     pub failure: Failure,
-    // Last, so that it ends after the store was closed: fields are dropped in this order.
+    // Last, because fields are dropped in this order: it must end after the store was closed.
     pub _open: Awake,
 }
 
-/// What the actors share. Lives as long as anyone uses the store.
+/// What the actors share. It exists as long as one of them uses the store.
 pub(super) struct Shared<D: Domain> {
     registrar: Registrar,
     trainer: OnceLock<Addr<Trainer<D>>>,
@@ -42,7 +42,7 @@ pub(super) struct Shared<D: Domain> {
 }
 
 impl<D: Domain> Shared<D> {
-    /// Must run on the actix system's thread, where `trainer` starts its threads.
+    /// Starts the trainers. Call it on the thread of the actix system.
     pub fn start(
         common: Common<D>,
         registrar: Registrar,
@@ -64,17 +64,17 @@ impl<D: Domain> Shared<D> {
         &*self.common.store.log
     }
 
-    /// Who writes the tenants' own streams.
+    /// Writes the tenants' own streams.
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
     }
 
-    /// Who is told of what became durable.
+    /// Takes notes of new records for the feed.
     pub fn notifications(&self) -> &CommitNotifications {
         &self.common.notifications
     }
 
-    /// What new people start with.
+    /// What the session of a new person starts with.
     pub fn new_session(&self) -> &Arc<NewSession> {
         &self.common.new
     }
@@ -94,14 +94,13 @@ impl<D: Domain> Shared<D> {
 
     /// Queues a training.
     ///
-    /// - returns: whether there was a place for it.
+    /// - returns: true if there was space for it.
     pub fn queue_training(self: &Arc<Self>, train: Train<D>) -> bool {
         let stream = train.stream.clone();
         let quota = self.common.meters.quotas(&stream.tenant).trainings_waiting;
         let most = quota.map_or(TRAIN_QUEUE_MAX, |quota| TRAIN_QUEUE_MAX.min(quota as usize));
         let queued = self.trainings().push(&stream, train, most);
-        // What it took the place of was asked for by a former actor of the same person, who is
-        // gone.
+        // It may replace a training of a former actor of the same person. That actor is gone.
         let taken = queued.is_ok();
         if !taken {
             self.common.meters.note_training_refused(&stream.tenant);
@@ -110,18 +109,18 @@ impl<D: Domain> Shared<D> {
         taken
     }
 
-    /// A training is over.
+    /// Notes that a training is over, and starts the next.
     pub fn trained(self: &Arc<Self>, stream: &StreamId) {
         self.trainings().finish(stream);
         self.hand_out_trainings();
     }
 
-    /// Gives free trainers what is due. The trainers' own queue is not bounded and knows no
-    /// tenants: it never holds more than there are trainers.
+    /// Gives a training to each free trainer. The queue of the trainers' actor has no limit and
+    /// knows no tenants, so it never gets more than there are trainers.
     fn hand_out_trainings(self: &Arc<Self>) {
         let trainer = self.trainer.get().expect("set before the first actor starts");
         if !trainer.connected() {
-            // The system stops. Whoever waits finds out at the next waking that it is still due.
+            // The system stops. When these people wake again, their trainings are still due.
             let waiting = self.trainings().clear();
             return drop(waiting);
         }
@@ -133,7 +132,8 @@ impl<D: Domain> Shared<D> {
         }
     }
 
-    // Its methods leave it whole whenever they return, and none of them calls back.
+    // A panic while the lock is held leaves nothing half changed, and none of its methods calls
+    // back.
     fn trainings(&self) -> MutexGuard<'_, Trainings<Train<D>>> {
         self.trainings.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -147,15 +147,15 @@ impl<D: Domain> Shared<D> {
     }
 }
 
-/// Rebuilds a session from the log. That of somebody new is not open, and nothing is written for
-/// them: only a command does that. Blocks.
+/// Rebuilds a session from the log. The session of a new person is not open; only a command writes
+/// records. Blocks.
 ///
-/// - errors: what to answer to whoever asks for this person.
+/// - errors: the answer to all requests for this person.
 pub(super) fn wake<D: Domain>(
     shared: &Shared<D>,
     stream: &StreamId,
 ) -> Result<Session<D>, Box<Response>> {
-    // Never pushed out of the memory of minds for long: everybody begins with it.
+    // Put back into the memory of minds, because everybody begins with it.
     shared.remember(&stream.tenant, shared.common.new.base.clone());
     let Common { domain, store, minds, .. } = &shared.common;
     replay::rebuild(domain, store, stream, minds).map_err(|error| {
@@ -164,9 +164,9 @@ pub(super) fn wake<D: Domain>(
     })
 }
 
-/// Trains a mind and keeps its bytes, before any record names them. Runs on a trainer's thread.
+/// Trains a mind and keeps its bytes, before a record names it. Runs on a thread of the trainers.
 ///
-/// - errors: the reason, in the trainer's words.
+/// - errors: why there is no mind, as a sentence.
 pub(super) fn train<D: Domain>(
     shared: &Shared<D>,
     stream: &StreamId,
@@ -177,13 +177,14 @@ pub(super) fn train<D: Domain>(
     let mind = learning::train(&*shared.common.domain, recipe, lessons)
         .map_err(|error| error.to_string())?;
     if let Err(error) = replay::keep_mind(&shared.common.store, stream, &mind) {
-        // The bytes of a mind are a cache: without them the next waking trains again.
+        // They are a cache: without them, the next waking trains again.
         tracing::warn!(%stream, %error, "the mind's bytes were not kept");
     }
     Ok(Arc::new(mind))
 }
 
-/// Keeps a snapshot, so that the next waking folds less. A cache: failing costs time only.
+/// Keeps a snapshot, so that the next waking applies fewer records. It is a cache: a failure only
+/// costs time.
 pub(super) fn keep_snapshot<D: Domain>(
     shared: &Shared<D>,
     stream: &StreamId,
@@ -194,7 +195,7 @@ pub(super) fn keep_snapshot<D: Domain>(
     }
 }
 
-/// Forgets the bytes of minds that nobody will ask for again.
+/// Deletes the kept bytes of all minds of a person but the present one.
 pub(super) fn forget_old_minds<D: Domain>(
     shared: &Shared<D>,
     stream: &StreamId,
@@ -206,7 +207,7 @@ pub(super) fn forget_old_minds<D: Domain>(
     }
 }
 
-/// A request id for what the service itself asks for.
+/// A request id for records that the service itself writes.
 pub(super) fn fresh_request() -> RequestId {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).expect("the operating system gives random bytes");

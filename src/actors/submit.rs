@@ -8,15 +8,20 @@ use crate::client::{PersonAsk, Response};
 use crate::ids::{RequestId, StreamId, TenantId, UserId};
 use crate::invariants::Invariant;
 
-/// One request on its way to the actor of its person.
+/// One request for a person.
 #[derive(Debug, Message)]
 #[rtype(result = "()")]
 pub struct Submit {
-    /// From the door the request came through, never from the request (invariant `TenantWall`).
+    /// From the endpoint and the key of the connection, never from the request (invariant
+    /// `TenantWall`).
     pub tenant: TenantId,
+    /// The person.
     pub user: UserId,
+    /// The id of the request.
     pub request: RequestId,
+    /// What is asked.
     pub ask: PersonAsk,
+    /// Where the answer goes.
     pub answer: AnswerTo,
 }
 
@@ -28,29 +33,31 @@ impl Submit {
     }
 }
 
-/// The way back to whoever asked. Used exactly once: when it is dropped unused, because an actor
-/// stopped or a panic swept it away, the caller is told to ask again. Asking again with the same
-/// request id is always safe (invariant `ExactlyOnce`).
+/// Sends the answer to the caller, exactly once. If it is dropped without an answer, because an
+/// actor stopped or panicked, the caller is told to ask again. It is always safe to ask again with
+/// the same request id (invariant `ExactlyOnce`).
 pub struct AnswerTo {
     way: Option<Box<dyn FnOnce(Response) + Send>>,
-    /// Keeps the person's actor from being put to sleep before there is an answer.
+    /// Keeps the person awake until there is an answer.
     awake: Option<Attention>,
-    /// Its tenant's place among the requests in flight.
+    /// Counts the request among those in flight.
     in_flight: Option<InFlight>,
 }
 
-/// Milliseconds after which a request that was lost inside the service may be sent again: long
-/// enough for a new actor to start, short enough not to be felt.
+/// Milliseconds after which a request that was lost inside the service may be sent again: time
+/// enough for a new actor to start, and too short to be noticed.
 const RETRY_LOST_MS: u32 = 50;
 
 impl AnswerTo {
+    /// - `way`: called with the answer, on any thread.
     pub fn new(way: impl FnOnce(Response) + Send + 'static) -> AnswerTo {
         AnswerTo { way: Some(Box::new(way)), awake: None, in_flight: None }
     }
 
+    /// Sends the answer.
     pub fn send(mut self, response: Response) {
-        // Before the answer is out: whoever gets it may ask at once for somebody else, who needs
-        // this one's place. The message that sends an actor to sleep waits for its handler's end.
+        // Before the answer is sent: the caller may at once ask for another person, who needs the
+        // place of this one. The actor still ends its present message before it goes to sleep.
         self.awake = None;
         self.in_flight = None;
         let law = Invariant::AnsweredOnce;

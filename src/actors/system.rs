@@ -29,7 +29,7 @@ use crate::store::{CacheCounter, CacheCounts, KeyError, Store};
 use crate::tenancy::Clock;
 use crate::world::Domain;
 
-/// Everybody who is awake, on an actix system with a thread of its own.
+/// All actors, on an actix system with its own thread.
 pub struct ActorSystem {
     directory: Addr<DirectoryActor>,
     registrar: Registrar,
@@ -41,51 +41,62 @@ pub struct ActorSystem {
     thread: Option<JoinHandle<()>>,
     failure: Failure,
     awake: Arc<AwakeCount>,
-    lives: Arc<AwakeCount>,
+    /// The parts of the service that use the store.
+    store_users: Arc<AwakeCount>,
     minds: Arc<Minds>,
     kept_minds: CacheCounter,
     snapshots: CacheCounter,
 }
 
-/// What waking people has cost since the start, and what their caches gave.
+/// What waking people has cost since the start, and what the caches saved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wakings {
+    /// Records applied and minds trained.
     pub work: Work,
+    /// Kept minds.
     pub minds: CacheCounts,
+    /// Kept snapshots.
     pub snapshots: CacheCounts,
 }
 
 /// What the actors are started with.
 pub struct ActorSettings<D: Domain> {
+    /// The world.
     pub domain: Arc<D>,
+    /// Keeps the records.
     pub store: Store,
-    /// What new people start with.
+    /// The recipe of new people, as TOML.
     pub recipe_text: String,
-    /// Trainings at once.
+    /// Trainings at the same time.
     pub trainers: usize,
     /// Threads that people's actors share.
     pub arbiters: usize,
-    /// People awake at once.
+    /// People awake at the same time.
     pub awake_max: usize,
+    /// Where the actors report that the service must stop.
     pub failure: Failure,
-    /// What record times and the overlaps of retired keys go by.
+    /// Gives the times of records and ends the overlaps of retired keys.
     pub clock: Clock,
 }
 
 /// Why the actors did not start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ActorsError {
+    /// The recipe is not valid.
     #[error("the recipe for new people cannot be read: {reason}")]
     Recipe { reason: String },
+    /// Training without lessons failed.
     #[error("the base mind cannot be trained: {reason}")]
     BaseMind { reason: String },
+    /// The records of a tenant cannot be read.
     #[error("the tenants' own records cannot be read: {0}")]
     Tenants(#[from] OrderError),
+    /// A thread did not start.
     #[error("the actors did not start: {reason}")]
     System { reason: String },
 }
 
-/// Where front ends hand in requests. Knows no domain.
+/// Takes requests from frontends. Does not depend on the domain.
 #[derive(Clone)]
 pub struct Front {
     directory: Addr<DirectoryActor>,
@@ -93,16 +104,16 @@ pub struct Front {
     archive: Archive,
 }
 
-/// A request that was not taken; its way back.
+/// A request that was not accepted. It must be answered in another way.
 pub enum NotTaken {
-    /// Too many are waiting.
+    /// Too many requests wait.
     Full(AnswerTo),
-    /// Nobody is there any more.
+    /// The actors have stopped.
     Closed(AnswerTo),
 }
 
 impl Front {
-    /// As [`ActorSystem::erase`]; when everybody is gone, `answer` is dropped.
+    /// As [`ActorSystem::erase`]. If the actors have stopped, `answer` is dropped.
     pub fn erase(
         &self,
         tenant: TenantId,
@@ -112,9 +123,10 @@ impl Front {
         self.directory.do_send(ErasePerson { tenant, user, answer: Box::new(answer) });
     }
 
-    /// Counts a request until it is answered. Comes before it is handed in.
+    /// Counts a request until it is answered. Call it before [`Front::submit`], [`Front::greet`] or
+    /// [`Front::ask_archive`].
     ///
-    /// - errors: what to answer, when its tenant has too much of something, or all together have.
+    /// - errors: the answer, if the tenant is over a quota or the service has too much work.
     pub fn let_in(
         &self,
         tenant: &TenantId,
@@ -125,12 +137,12 @@ impl Front {
         Ok(())
     }
 
-    /// Notes that something was not sent, because the tenant's connections do not read.
+    /// Notes that something was dropped, because the tenant's clients do not read.
     pub fn note_unread(&self, tenant: &TenantId) {
         self.meters.note_unread(tenant);
     }
 
-    /// Hands in what is asked of a person's actor.
+    /// Gives a request to a person's actor. Wakes the person.
     pub fn submit(&self, submit: Submit) -> Result<(), NotTaken> {
         self.directory.try_send(submit).map_err(|error| match error {
             SendError::Full(submit) => NotTaken::Full(submit.answer),
@@ -138,7 +150,7 @@ impl Front {
         })
     }
 
-    /// Asks who is there.
+    /// Asks which service this is.
     pub fn greet(&self, answer: AnswerTo) -> Result<(), NotTaken> {
         self.directory.try_send(Greeting { answer }).map_err(|error| match error {
             SendError::Full(greeting) => NotTaken::Full(greeting.answer),
@@ -159,12 +171,14 @@ impl Front {
 
 /// How long a stop waits for actors to fall asleep, and then for trainings to end.
 const FALL_ASLEEP: Duration = Duration::from_secs(30);
-/// The same when the service has failed: it must be seen to be gone, and nothing that it could
-/// still do in order would be kept.
+/// The same if the service has failed. It must end soon, and nothing that it still did would be
+/// kept.
 const FALL_DOWN: Duration = Duration::from_millis(200);
 
 impl ActorSystem {
-    /// Trains the base mind, so that nobody ever waits for it, and starts the actors.
+    /// Trains the base mind, so that no request waits for it, and starts the actors. Blocks.
+    ///
+    /// - errors: see [`ActorsError`].
     pub fn start<D: Domain>(settings: ActorSettings<D>) -> Result<ActorSystem, ActorsError> {
         let ActorSettings {
             domain,
@@ -184,7 +198,8 @@ impl ActorSystem {
             domain: domain.id().to_owned(),
             recipe: recipe.name().to_owned(),
         };
-        let (awake, lives) = (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
+        let (awake, store_users) =
+            (Arc::new(AwakeCount::default()), Arc::new(AwakeCount::default()));
         let minds = Arc::<Minds>::default();
         let (kept_minds, snapshots) = (store.models.counter(), store.snapshots.counter());
         let tenant_registry = TenantRegistry::open_by(store.clone(), clock)?;
@@ -200,14 +215,14 @@ impl ActorSystem {
             meters: meters.clone(),
             notifications: notifications.clone(),
             failure: failure.clone(),
-            _open: lives.enter(),
+            _open: store_users.enter(),
         };
-        let archive = Archive::start(reader.clone(), lives.enter())
+        let archive = Archive::start(reader.clone(), store_users.enter())
             .map_err(|error| ActorsError::System { reason: error.to_string() })?;
 
         let (started, ready) = mpsc::channel();
         let (count, alarm) = (awake.clone(), failure.alarm("the actors' thread ended"));
-        let (failed, registry_open) = (failure.clone(), lives.enter());
+        let (failed, registry_open) = (failure.clone(), store_users.enter());
         let measured = meters.clone();
         let thread = thread::Builder::new()
             .name("actors".to_owned())
@@ -257,13 +272,14 @@ impl ActorSystem {
             thread,
             failure,
             awake,
-            lives,
+            store_users,
             minds,
             kept_minds,
             snapshots,
         })
     }
 
+    /// Takes requests.
     pub fn front(&self) -> Front {
         Front {
             directory: self.directory.clone(),
@@ -272,29 +288,30 @@ impl ActorSystem {
         }
     }
 
-    /// What became durable, for one listener.
+    /// Tells one listener which records are new.
     pub fn notifications(&self) -> &CommitNotifications {
         &self.notifications
     }
 
-    /// Reads what is durable; none after a stop. To be dropped before one.
+    /// Reads durable records; none after a stop. Drop it before you stop the actors.
     pub fn reader(&self) -> Option<ArchiveReader> {
         self.reader.clone()
     }
 
-    /// What each tenant takes, and how often it was turned away.
+    /// What each tenant uses, and how often it was refused.
     pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
         self.meters.usage()
     }
 
-    /// Where orders about tenants are handed in.
+    /// Takes orders about tenants.
     pub fn registrar(&self) -> &Registrar {
         &self.registrar
     }
 
-    /// Erases a person: destroys their key, so that nothing they said can be read any more, and
-    /// records that it was done. `answer` is called once, from another thread. Nobody is awake in
-    /// their name meanwhile; whoever uses the name afterwards is somebody new.
+    /// Erases a person: destroys their key, so that their records can no longer be decrypted, and
+    /// records it. The person is asleep meanwhile. Afterwards the name belongs to a new person.
+    ///
+    /// - `answer`: called once, from another thread.
     pub fn erase(
         &self,
         tenant: TenantId,
@@ -324,14 +341,15 @@ impl ActorSystem {
         self.archive.close();
         self.reader = None;
         self.directory.do_send(SleepAll);
-        if !self.awake.wait_for_silence(patience) {
+        if !self.awake.wait_for_none(patience) {
             tracing::warn!(awake = self.awake.now(), "stopping although not everybody sleeps");
         }
         self.system.stop();
         // A panic in there was reported by its alarm.
         let _ = thread.join();
-        // A training that still runs holds the store; whoever opens it next must not find it busy.
-        if !self.lives.wait_for_silence(patience) {
+        // A training that still runs uses the store, and the store must be free for the next
+        // process.
+        if !self.store_users.wait_for_none(patience) {
             tracing::warn!("the store is still held by a training");
         }
         let Wakings { work, minds, snapshots } = self.wakings();
@@ -355,7 +373,7 @@ impl Drop for ActorSystem {
     }
 }
 
-/// Trains the mind that new people start with.
+/// Trains the mind of new people.
 fn base_mind<D: Domain>(domain: &D, recipe: &Recipe) -> Result<Arc<Mind>, ActorsError> {
     let train = || learning::train(domain, recipe, &[]).map_err(|error| error.to_string());
     let trained = catch_unwind(AssertUnwindSafe(train)).map_err(|panic| panic_words(&*panic));
@@ -375,7 +393,7 @@ impl<D: Domain> People for Homes<D> {
     }
 
     fn wake(&self, waking: Waking) -> Address {
-        // The key is a keyed hash: its bytes are spread evenly.
+        // The key of a stream is a keyed hash, so its bytes are evenly distributed.
         let place = usize::from(waking.stream.key.0[0]) % self.homes.len();
         let shared = self.shared.clone();
         let start = move |_: &mut _| UserActor::new(shared, waking);

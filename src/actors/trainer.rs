@@ -11,7 +11,7 @@ use crate::ids::{Digest, StreamId};
 use crate::learning::{Lesson, Mind, Recipe};
 use crate::world::Domain;
 
-/// Trains minds, several at once, on threads of its own beside the actors (`SyncArbiter`).
+/// Trains minds, several at the same time, on its own threads (`SyncArbiter`).
 pub(super) struct Trainer<D: Domain> {
     pub shared: Arc<Shared<D>>,
 }
@@ -21,13 +21,13 @@ pub(super) struct Train<D: Domain> {
     pub stream: StreamId,
     pub recipe: Arc<Recipe>,
     pub lessons: Vec<Lesson<D::Scene, D::Task>>,
-    /// Whom to tell.
+    /// Gets the result.
     pub tell: Recipient<Trained>,
-    /// Nobody whose training runs is put to sleep.
+    /// Keeps the person awake until the training is over.
     pub attention: Attention,
 }
 
-/// A training whose turn it is.
+/// A training that a trainer begins now.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub(super) struct Run<D: Domain> {
@@ -35,8 +35,7 @@ pub(super) struct Run<D: Domain> {
     pub slot: Slot<D>,
 }
 
-/// One of the trainers, taken. When it is dropped, however the training ended, the next one in
-/// turn gets it.
+/// A trainer in use. When this is dropped, also after a panic, the next training gets the trainer.
 pub(super) struct Slot<D: Domain> {
     pub shared: Arc<Shared<D>>,
     pub stream: StreamId,
@@ -67,8 +66,8 @@ impl<D: Domain> Handler<Run<D>> for Trainer<D> {
     fn handle(&mut self, run: Run<D>, _: &mut SyncContext<Self>) {
         let Run { train: Train { stream, recipe, lessons, tell, attention }, slot } = run;
         let start = Instant::now();
-        // A panic that left this handler would end the worker for good, and with it, one by one,
-        // every training of everybody.
+        // A panic that left this handler would end this thread of the trainers. After some panics
+        // there would be no trainer left.
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             shared::train(&self.shared, &stream, &recipe, &lessons)
         }))
@@ -81,8 +80,8 @@ impl<D: Domain> Handler<Run<D>> for Trainer<D> {
             "trained"
         );
         drop(slot);
-        // Past the mailbox bound on purpose: this message must not be lost, and there is at most
-        // one for each person.
+        // It ignores the limit of the mailbox on purpose: this message must not be lost, and there
+        // is at most one for each person.
         tell.do_send(Trained { recipe: recipe.digest(), outcome, attention });
     }
 }

@@ -17,17 +17,17 @@ use crate::replay;
 use crate::store::Pending;
 use crate::world::Domain;
 
-/// Carries out what a person's [`Seat`] says, and tells it what came of it.
+/// Carries out the effects of a person's [`Seat`], and gives it the results.
 pub(super) struct UserActor<D: Domain> {
     shared: Arc<Shared<D>>,
     waking: Waking,
     seat: Seat<D, AnswerTo>,
 }
 
-/// A step of work that must be over before the next message is handled.
+/// Work that must end before the actor takes the next message.
 type Atomic<D> = LocalBoxActorFuture<UserActor<D>, ()>;
 
-/// What came of an effect.
+/// The result of an effect.
 enum Outcome<D: Domain> {
     Done,
     Known(Input<D, AnswerTo>),
@@ -41,8 +41,8 @@ impl<D: Domain> UserActor<D> {
         UserActor { shared, waking, seat }
     }
 
-    /// Hands `input` to the seat and carries out what it says, up to the end of all of it. While
-    /// the log is appending, the future holds the mailbox back: the seat has one writer.
+    /// Gives `input` to the seat and carries out all effects that follow. While the log appends,
+    /// the actor takes no other message, so the stream has one writer.
     fn step(&mut self, input: Input<D, AnswerTo>, ctx: &mut Context<Self>) -> Atomic<D> {
         let mut inputs = VecDeque::from([input]);
         let mut appending = None;
@@ -126,8 +126,8 @@ impl<D: Domain> Actor for UserActor<D> {
     fn started(&mut self, ctx: &mut Context<Self>) {
         ctx.set_mailbox_capacity(MAILBOX_MAX);
         let (shared, stream) = (self.shared.clone(), self.waking.stream.clone());
-        // Reading a long stream, or training a mind again, must not hold up the other people of
-        // this arbiter.
+        // On another thread: reading a long stream or training a mind must not delay the other
+        // people of this arbiter.
         let rebuilt = tokio::task::spawn_blocking(move || shared::wake(&shared, &stream));
         ctx.wait(rebuilt.into_actor(self).then(|result, actor, ctx| {
             let woken = result.unwrap_or_else(|panic| {
@@ -157,7 +157,7 @@ impl<D: Domain> Handler<Trained> for UserActor<D> {
         let Trained { recipe, outcome, attention } = trained;
         let (at, fresh) = (self.shared.now(), shared::fresh_request());
         let step = self.step(Input::Trained { recipe, outcome, at, fresh }, ctx);
-        // Nobody is put to sleep before their training is recorded.
+        // The person stays awake until the training is recorded.
         AtomicResponse::new(Box::pin(step.map(move |(), _, _| drop(attention))))
     }
 }

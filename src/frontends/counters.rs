@@ -1,6 +1,6 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What came through the doors since they were opened.
+/// Counts what came through the endpoints since the start.
 #[derive(Debug, Default)]
 pub struct Counters {
     pub(super) received: AtomicU64,
@@ -19,38 +19,42 @@ pub struct Counters {
     pub(super) handshakes_crowded: AtomicU64,
 }
 
-/// [`Counters`] at one moment, in messages; those of handshakes in handshakes.
+/// [`Counters`] at one moment, in messages or in handshakes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
+    /// Messages received.
     pub received: u64,
+    /// Answers sent.
     pub answered: u64,
-    /// Malformed beyond an answer: not one frame, or no request id.
+    /// Messages that cannot be answered: not one frame, or no request id.
     pub dropped: u64,
-    /// Dropped at the door with keys, because nobody vouched for their connection.
+    /// Messages dropped at an endpoint with keys, because the authenticator did not answer the
+    /// handshake of their connection.
     pub unvouched: u64,
-    /// Answered with an error, because they were no request.
+    /// Messages answered with an error, because they were not a request.
     pub refused: u64,
-    /// Answered with an error, because whoever sent them may not ask that, or nothing any more.
+    /// Messages answered with an error, because their sender may not ask this, or is not admitted.
     pub denied: u64,
-    /// Turned away by the gateway itself because of too much work.
+    /// Requests refused by the gateway because it had too much work.
     pub busy: u64,
-    /// Turned away by the gateway because their tenant takes more than it may.
+    /// Requests refused by the gateway because their tenant is over a quota.
     pub over_quota: u64,
-    /// Answers whose peer was gone, or has a thousand messages to read.
+    /// Answers whose client was gone, or had too many messages to read.
     pub undelivered: u64,
-    /// Connections let in by their key.
+    /// Connections whose key was accepted.
     pub handshakes: u64,
-    /// Connections whose key was not let in.
+    /// Connections whose key was not accepted.
     pub handshakes_denied: u64,
-    /// Answers that were dropped, because too many bytes waited for their connection or its tenant.
+    /// Answers dropped because too many bytes waited for their connection or their tenant.
     pub unread: u64,
-    /// Messages of the feed that were left out, because too many bytes of their tenant's waited.
+    /// Messages of the feed dropped because too many bytes of their tenant waited.
     pub feed_unread: u64,
-    /// Connections that were not let in because there were too many.
+    /// Connections refused because there were too many.
     pub handshakes_crowded: u64,
 }
 
 impl Counters {
+    /// The counts at this moment.
     pub fn now(&self) -> Counts {
         let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         Counts {

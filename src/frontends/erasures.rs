@@ -3,11 +3,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::ids::{RequestId, TenantId};
 
-/// Erasures of late, by the requests that asked for them. A name that was erased stands for
-/// somebody new as soon as it is used again, so a request that is sent once more, because its answer
-/// was lost, must not erase that one too.
+/// Remembers the last erasures by their request ids. After an erasure, the name can belong to a new
+/// person. So a request that is sent again, because its answer was lost, must not erase this person
+/// too.
 ///
-/// - `V`: what is answered.
+/// `V` is the answer.
 #[derive(Debug)]
 pub(super) struct Erasures<V>(Arc<Mutex<Inner<V>>>);
 
@@ -17,16 +17,18 @@ struct Inner<V> {
     order: VecDeque<(TenantId, RequestId)>,
 }
 
-/// What is to be done about a request.
+/// What to do with a request.
 #[derive(Debug, PartialEq)]
 pub(super) enum Asked<V> {
-    /// It is new.
+    /// Carry it out: it is new.
     First,
+    /// Say that it is being carried out.
     UnderWay,
+    /// Give this answer: it was carried out.
     Done(V),
 }
 
-/// Far more than are asked for while a client retries.
+/// Erasures that are remembered: more than can be requested while one client retries.
 const REMEMBERED_MAX: usize = 4_096;
 
 impl<V> Clone for Erasures<V> {
@@ -41,6 +43,7 @@ impl<V: Clone> Erasures<V> {
         Erasures(Arc::new(Mutex::new(Inner { asked, order })))
     }
 
+    /// Notes a request, if it is new.
     pub fn ask(&self, tenant: &TenantId, id: RequestId) -> Asked<V> {
         let mut inner = self.lock();
         let name = (tenant.clone(), id);
@@ -59,13 +62,15 @@ impl<V: Clone> Erasures<V> {
         Asked::First
     }
 
-    /// - `view`: none when it went wrong: the request may be tried again.
+    /// Notes that a request was carried out.
+    ///
+    /// - `view`: the answer; none if it failed, so that it can be tried again.
     pub fn end(&self, tenant: &TenantId, id: RequestId, view: Option<V>) {
         let mut inner = self.lock();
         let name = (tenant.clone(), id);
         match view {
             Some(view) => {
-                // Unless so many came after it that it was forgotten.
+                // It is forgotten if too many came after it.
                 if let Some(known) = inner.asked.get_mut(&name) {
                     *known = Some(view);
                 }
@@ -77,7 +82,7 @@ impl<V: Clone> Erasures<V> {
         }
     }
 
-    // Two collections that a panic cannot leave in half: each change is one call.
+    // A panic while the lock is held leaves nothing half changed.
     fn lock(&self) -> MutexGuard<'_, Inner<V>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

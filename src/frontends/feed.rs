@@ -1,11 +1,11 @@
-//! The feed: what becomes durable is published, each tenant's at sockets of its own: one of sealed
-//! records, one of plain ones. A subscriber that is slow misses messages, as it is with PUB; each
-//! says which number it has, so that it is noticed, and what was missed is asked for at the door
-//! (`heads`, `records`, `plain_records`). The log is the record; the feed only says that it grew.
+//! The feed publishes new records. Each tenant has two sockets: one for encrypted records and one
+//! for decrypted ones. A slow subscriber misses messages. Each message has a number, so the
+//! subscriber notices and requests the missed records from the service (`heads`, `records`,
+//! `plain_records`).
 //!
-//! Nothing of what goes out is held against a key again. So a tenant's sockets are closed, and
-//! opened anew, before anything is published after a key that could have come in was taken back:
-//! everybody else reconnects by themselves and fetches what they missed.
+//! Messages are authorised when a subscriber connects, not when they are sent. So revoking a key
+//! closes and reopens the tenant's sockets before the next message is published. The other
+//! subscribers reconnect by themselves and request what they missed.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,12 +14,12 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::counters::{Counters, count};
-use super::door::vouched;
+use super::listener::vouched;
 use super::outbox::{Inbox, Outbox};
 use super::passes::Passes;
 use super::raw::Outlet;
 use super::unsent::Unsent;
-use super::zap::{Gate, Seal};
+use super::zap::{HandshakeSecret, ZapDomain};
 use super::{GatewayError, lock, rights};
 use crate::actors::{ArchiveReader, CommitNotification, CommitNotifications, Failure, Front};
 use crate::client::{BEAT, Context, CurveKey, Endpoint, FeedMessage, FeedView, wire};
@@ -27,27 +27,29 @@ use crate::ids::{PublicKey, RequestId, Seq, StreamKey, TenantId};
 use crate::limits::{CUT_OFF_S, FEED_UNSENT_BYTES_MAX, FOREIGN_TOPICS_MAX, TOPICS_MAX};
 use crate::tenancy::Admissions;
 
-/// What a feed is made of.
+/// What a feed needs.
 #[derive(Debug)]
-pub struct FeedDoor<'a> {
-    /// The first tenant's first endpoint; the others follow.
+pub struct FeedSettings<'a> {
+    /// The first endpoint of the first tenant. The others get the next ports, or longer paths.
     pub endpoint: &'a Endpoint,
-    /// Messages that wait for one subscriber; see [`crate::limits::FEED_WAITING_MAX`].
+    /// Messages that may wait for one subscriber; see [`crate::limits::FEED_WAITING_MAX`].
     pub waiting_max: i32,
+    /// Tell which records are new.
     pub notifications: CommitNotifications,
+    /// Reads these records.
     pub reader: ArchiveReader,
 }
 
-/// What the feed holds its subscribers against.
+/// What decides who may subscribe, and how much.
 pub(super) struct Watch {
     pub admissions: Admissions,
-    pub seal: Seal,
+    pub secret: HandshakeSecret,
     pub passes: Passes,
     pub counters: Arc<Counters>,
     pub front: Front,
 }
 
-/// The thread that publishes. Closes its sockets when dropped.
+/// The thread that publishes. It ends when this is dropped.
 #[derive(Debug)]
 pub(super) struct Feed {
     views: Views,
@@ -63,9 +65,9 @@ pub(super) struct Views {
     endpoints: Arc<RwLock<BTreeMap<TenantId, [Option<String>; 2]>>>,
 }
 
-/// Seconds between two beats, and after which keys whose time is over are noticed at the latest.
+/// The time between two beats. Keys whose overlap has ended are noticed within this time.
 const BEAT_EVERY: Duration = Duration::from_secs(1);
-/// Milliseconds that messages may take to leave the process when the service stops.
+/// How long messages may take to leave the process when the service stops, in milliseconds.
 const LINGER_MS: i32 = 500;
 
 impl Views {
@@ -75,14 +77,16 @@ impl Views {
         Views { start: RequestId(start), endpoints: Arc::default() }
     }
 
-    /// - `plain`: whoever asks may have records in the clear.
+    /// What a caller is told about the feed of a tenant.
+    ///
+    /// - `plain`: the caller may read decrypted records.
     pub fn view(&self, tenant: &TenantId, plain: bool) -> FeedView {
         let endpoints = self.endpoints.read().unwrap_or_else(PoisonError::into_inner);
         let [sealed, open] = endpoints.get(tenant).cloned().unwrap_or_default();
         FeedView { start: self.start, sealed, plain: open.filter(|_| plain) }
     }
 
-    /// Every endpoint, with its tenant and whether it is a plain one.
+    /// Every endpoint, with its tenant and whether its records are decrypted.
     pub fn all(&self) -> Vec<(TenantId, bool, String)> {
         let endpoints = self.endpoints.read().unwrap_or_else(PoisonError::into_inner);
         let of = |(tenant, both): (&TenantId, &[Option<String>; 2])| {
@@ -101,19 +105,22 @@ impl Views {
 }
 
 impl Feed {
-    /// The authenticator must be there already, and must outlive it.
+    /// Opens the sockets and starts the thread. The authenticator must run already, and must end
+    /// later.
+    ///
+    /// - errors: an endpoint is in use, or the thread does not start.
     pub fn open(
         context: &Context,
-        door: FeedDoor<'_>,
+        settings: FeedSettings<'_>,
         key: &CurveKey,
         watch: Watch,
         failure: Failure,
     ) -> Result<Feed, GatewayError> {
         let start = |error: std::io::Error| GatewayError::Start { reason: error.to_string() };
-        let FeedDoor { endpoint, waiting_max, notifications, reader } = door;
+        let FeedSettings { endpoint, waiting_max, notifications, reader } = settings;
         let (bell, inbox) = Outbox::new().map_err(start)?;
         let (views, stopping) = (Views::new(), Arc::new(AtomicBool::new(false)));
-        let mut press = Press {
+        let mut publisher = Publisher {
             context: context.clone(),
             base: endpoint.clone(),
             ports_taken: 0,
@@ -125,16 +132,16 @@ impl Feed {
             reader,
             failure: failure.clone(),
             views: views.clone(),
-            stands: BTreeMap::new(),
+            feeds: BTreeMap::new(),
         };
-        press.open_all()?;
+        publisher.open_all()?;
         let (wake, stopped) = (bell.clone(), stopping.clone());
         notifications.listen(move || wake.wake());
         let thread = thread::Builder::new()
             .name("feed".to_owned())
             .spawn(move || {
                 let _alarm = failure.alarm("the feed's thread ended");
-                press.serve(inbox, &stopped);
+                publisher.serve(inbox, &stopped);
             })
             .map_err(start)?;
         Ok(Feed { views, stopping, bell, thread: Some(thread) })
@@ -144,7 +151,7 @@ impl Feed {
         &self.views
     }
 
-    /// Publishes what is noted and closes the sockets.
+    /// Publishes the records that are already noted, and closes the sockets.
     pub fn close(&mut self) {
         self.stopping.store(true, Ordering::SeqCst);
         self.bell.wake();
@@ -162,53 +169,52 @@ impl Drop for Feed {
 }
 
 /// What the feed's thread owns.
-struct Press {
+struct Publisher {
     context: Context,
     base: Endpoint,
-    /// Ports after the base's that were given away.
+    /// Ports after that of `base` that are in use.
     ports_taken: u16,
     waiting_max: i32,
     key: CurveKey,
     watch: Watch,
-    /// Messages that have not left the process.
+    /// Messages that have not left the process yet.
     unsent: Unsent,
     notifications: CommitNotifications,
     reader: ArchiveReader,
     failure: Failure,
     views: Views,
-    stands: BTreeMap<TenantId, Stand>,
+    feeds: BTreeMap<TenantId, TenantFeed>,
 }
 
 /// One tenant's sockets, the sealed one first.
-struct Stand {
+struct TenantFeed {
     tenant: TenantId,
     sockets: [Option<Subscribed>; 2],
-    /// Where they are, or are to be.
+    /// Where they are, or will be.
     endpoints: [String; 2],
-    /// Keys that could have come in and may not any more, when the sockets were opened.
+    /// Keys of followers that were already revoked when the sockets were opened.
     ended: BTreeSet<PublicKey>,
-    /// Said once that they cannot be opened.
+    /// The log already says that they cannot be opened.
     warned: bool,
 }
 
-/// A socket, and what was subscribed to at it.
+/// A socket, and the topics that are subscribed to.
 struct Subscribed {
     socket: Outlet,
     topics: Topics,
 }
 
-/// Bounds for what each key may subscribe to. `libzmq` keeps a tree of all topics that subscribers
-/// ask for, and has no bound of its own; it tells of each topic that is new or that nobody wants
-/// any more.
+/// Limits how many topics each key may subscribe to. `libzmq` keeps all topics in memory, without a
+/// limit. It tells when a topic gets its first subscriber and when it loses its last.
 #[derive(Debug, Default)]
 struct Topics {
     of: HashMap<Vec<u8>, PublicKey>,
-    /// Of each key: topics that are published, and others.
+    /// For each key: its topics that can be published, and its other topics.
     counts: BTreeMap<PublicKey, [usize; 2]>,
 }
 
 impl Topics {
-    /// - returns: whether the key has subscribed to too much.
+    /// - returns: true if the key has now subscribed to too many topics.
     fn add(&mut self, topic: &[u8], key: PublicKey) -> bool {
         let foreign = usize::from(!is_published(topic));
         if self.of.insert(topic.to_vec(), key).is_some() {
@@ -231,7 +237,7 @@ impl Topics {
     }
 }
 
-/// Whether something may be published under `topic`, or under one that begins with it.
+/// True if a message can have this topic, or a topic that begins with it.
 fn is_published(topic: &[u8]) -> bool {
     let hex = |byte: &u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(byte);
     BEAT.as_bytes().starts_with(topic)
@@ -239,9 +245,9 @@ fn is_published(topic: &[u8]) -> bool {
 }
 
 impl Subscribed {
-    /// Takes what subscribers have sent.
+    /// Reads what subscribers have sent.
     ///
-    /// - returns: the key that has subscribed to too much, if one has.
+    /// - returns: a key that has subscribed to too many topics; none if there is none.
     fn hear(&mut self, watch: &Watch) -> zmq::Result<Option<PublicKey>> {
         for _ in 0..BURST {
             let mut frame = match self.socket.recv_msg(zmq::DONTWAIT) {
@@ -249,13 +255,13 @@ impl Subscribed {
                 Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => return Ok(None),
                 Err(error) => return Err(error),
             };
-            let key = vouched(&watch.seal, &watch.passes, &mut frame);
+            let key = vouched(&watch.secret, &watch.passes, &mut frame);
             match (frame.split_first(), key) {
                 (Some((1, topic)), Some(key)) if self.topics.add(topic, key) => {
                     return Ok(Some(key));
                 }
                 (Some((0, topic)), _) => self.topics.remove(topic),
-                // No subscription, or a connection that the authenticator did not vouch for.
+                // Not a subscription, or the authenticator did not answer the handshake.
                 _ => {}
             }
         }
@@ -263,13 +269,13 @@ impl Subscribed {
     }
 }
 
-impl Press {
+impl Publisher {
     fn serve(mut self, mut inbox: Inbox<()>, stopping: &AtomicBool) {
         let mut beaten = Instant::now();
         loop {
             let due = BEAT_EVERY.saturating_sub(beaten.elapsed());
             let mut items = vec![zmq::PollItem::from_fd(inbox.fd(), zmq::POLLIN)];
-            let sockets = self.stands.values().flat_map(|stand| stand.sockets.iter().flatten());
+            let sockets = self.feeds.values().flat_map(|feed| feed.sockets.iter().flatten());
             items.extend(sockets.map(|at| at.socket.as_poll_item(zmq::POLLIN)));
             match zmq::poll(&mut items, due.as_millis() as i64) {
                 Ok(_) | Err(zmq::Error::EINTR) => {}
@@ -285,14 +291,15 @@ impl Press {
             while let Some(notification) = self.notifications.next() {
                 self.publish(&notification);
                 published += 1;
-                // Sending takes in subscriptions, too: they are counted in between.
+                // While it sends, ZeroMQ also reads subscriptions. They must be counted in between.
                 if published.is_multiple_of(HEAR_EVERY) {
                     self.hear();
                 }
             }
-            // Whoever failed answers handshakes no more: nothing goes out to whoever came in then.
+            // If the ZAP thread has died, newer connections were never authenticated. Publish
+            // nothing more.
             if self.failure.reason().is_some() {
-                return self.stands.values_mut().for_each(Stand::close);
+                return self.feeds.values_mut().for_each(TenantFeed::close);
             }
             if stops {
                 return;
@@ -304,13 +311,14 @@ impl Press {
         }
     }
 
-    /// Reads subscriptions, and cuts off who subscribes to too much. A connection cannot be ended
-    /// alone: its tenant's sockets are closed, which forgets all topics, and opened anew.
+    /// Reads subscriptions, and blocks a key that subscribes to too many topics. ZeroMQ cannot end
+    /// one connection, so the sockets of the tenant are closed, which forgets all topics, and
+    /// reopened.
     fn hear(&mut self) {
-        let Press { stands, watch, .. } = self;
-        for stand in stands.values_mut() {
+        let Publisher { feeds, watch, .. } = self;
+        for feed in feeds.values_mut() {
             let mut cut_off = None;
-            for subscribed in stand.sockets.iter_mut().flatten() {
+            for subscribed in feed.sockets.iter_mut().flatten() {
                 match subscribed.hear(watch) {
                     Ok(None) => {}
                     Ok(Some(key)) => cut_off = Some(key),
@@ -318,32 +326,32 @@ impl Press {
                 }
             }
             if let Some(key) = cut_off {
-                let tenant = &stand.tenant;
+                let tenant = &feed.tenant;
                 tracing::warn!(
                     %tenant, %key, seconds = CUT_OFF_S,
                     "a key subscribed to too many topics: it is blocked, and its feed is reopened"
                 );
                 watch.passes.cut_off(key);
-                stand.close();
+                feed.close();
             }
         }
     }
 
-    /// - errors: an endpoint is taken.
+    /// - errors: an endpoint is in use.
     fn open_all(&mut self) -> Result<(), GatewayError> {
         for tenant in self.watch.admissions.tenants() {
             self.tend(&tenant);
-            let Some(stand) = self.stands.get(&tenant) else { continue };
-            if let Some(at) = stand.sockets.iter().position(Option::is_none) {
-                let (endpoint, reason) = (stand.endpoints[at].clone(), "the feed needs it".into());
+            let Some(feed) = self.feeds.get(&tenant) else { continue };
+            if let Some(at) = feed.sockets.iter().position(Option::is_none) {
+                let (endpoint, reason) = (feed.endpoints[at].clone(), "the feed needs it".into());
                 return Err(GatewayError::Bind { endpoint, reason });
             }
         }
         Ok(())
     }
 
-    /// Brings a tenant's sockets up to date with its register: none for who has no followers, and
-    /// new ones when somebody who could have come in may not any more.
+    /// Opens, reopens or closes a tenant's sockets as its keys require: none without a key of a
+    /// follower, and new ones after such a key was revoked.
     fn tend(&mut self, tenant: &TenantId) {
         let Some(standing) = self.watch.admissions.standing(tenant) else { return };
         // Read after the register: see `Admissions`.
@@ -352,35 +360,36 @@ impl Press {
             standing.keys().iter().filter(|(_, key)| rights::SEALED.contains(&key.role));
         let (admitted, ended): (BTreeSet<PublicKey>, BTreeSet<PublicKey>) =
             may_follow.map(|(key, _)| *key).partition(|key| standing.admits(key, wall).is_some());
-        if admitted.is_empty() && !self.stands.contains_key(tenant) {
+        if admitted.is_empty() && !self.feeds.contains_key(tenant) {
             return;
         }
-        if !self.stands.contains_key(tenant) {
+        if !self.feeds.contains_key(tenant) {
             let endpoints = [false, true].map(|plain| self.place(tenant, plain));
             let (tenant, ended) = (tenant.clone(), ended.clone());
             let sockets = [None, None];
-            let stand = Stand { tenant: tenant.clone(), sockets, endpoints, ended, warned: false };
-            self.stands.insert(tenant, stand);
+            let feed =
+                TenantFeed { tenant: tenant.clone(), sockets, endpoints, ended, warned: false };
+            self.feeds.insert(tenant, feed);
         }
-        let stand = self.stands.get_mut(tenant).expect("it was just looked for");
-        if !ended.is_subset(&stand.ended) {
+        let feed = self.feeds.get_mut(tenant).expect("it was just looked for");
+        if !ended.is_subset(&feed.ended) {
             tracing::info!(%tenant, "a follower's key was revoked: its feed is reopened");
-            stand.close();
+            feed.close();
         }
-        stand.ended = ended;
+        feed.ended = ended;
         if admitted.is_empty() {
-            stand.close();
+            feed.close();
         }
         for place in 0..2 {
-            if stand.sockets[place].is_none() && !admitted.is_empty() {
-                stand.open(place, &self.context, &self.key, self.waiting_max);
+            if feed.sockets[place].is_none() && !admitted.is_empty() {
+                feed.open(place, &self.context, &self.key, self.waiting_max);
             }
-            let there = stand.sockets[place].is_some();
-            self.views.set(tenant, place, there.then(|| stand.endpoints[place].clone()));
+            let there = feed.sockets[place].is_some();
+            self.views.set(tenant, place, there.then(|| feed.endpoints[place].clone()));
         }
     }
 
-    /// Where a tenant's next socket is to be.
+    /// The endpoint of a tenant's next socket.
     fn place(&mut self, tenant: &TenantId, plain: bool) -> String {
         let kind = if plain { "plain" } else { "sealed" };
         if let Endpoint::Ipc(path) = &self.base {
@@ -404,11 +413,11 @@ impl Press {
         if self.failure.reason().is_some() {
             return;
         }
-        let Some(stand) = self.stands.get(tenant) else { return };
+        let Some(feed) = self.feeds.get(tenant) else { return };
         let count = (notification.last.get() - notification.first.get() + 1) as u32;
         let number = |seq: Seq| notification.number + (seq.get() - notification.first.get());
         let start = self.views.start;
-        if let Some(Subscribed { socket, .. }) = &stand.sockets[0] {
+        if let Some(Subscribed { socket, .. }) = &feed.sockets[0] {
             match self.reader.sealed(&notification.stream, notification.first, count) {
                 Ok(read) => {
                     for record in read.records {
@@ -420,11 +429,11 @@ impl Press {
                         self.send(tenant, socket, topic, &message);
                     }
                 }
-                // Whoever asks at the door hears it, and the operator's log says it.
+                // A client that requests these records gets the error, too.
                 Err(error) => tracing::error!(%tenant, %error, "records cannot be published"),
             }
         }
-        if let Some(Subscribed { socket, .. }) = &stand.sockets[1] {
+        if let Some(Subscribed { socket, .. }) = &feed.sockets[1] {
             match self.reader.plain(&notification.stream, notification.first, count) {
                 Ok(read) => {
                     for record in read.records {
@@ -446,7 +455,7 @@ impl Press {
             count(&self.watch.counters.feed_unread);
             return self.watch.front.note_unread(tenant);
         };
-        // A publisher never waits; who did not get it will see that its number is missing.
+        // A publisher never waits. A subscriber that misses this message notices its number.
         if let Err(error) = socket.send_parcel(vec![topic.into_bytes()], parcel) {
             tracing::warn!(%error, "a message of the feed was not sent");
         }
@@ -458,45 +467,44 @@ impl Press {
         }
         let Some(numbers) = self.notifications.all_taken() else { return };
         let (v, start) = (wire::VERSION, self.views.start);
-        for (tenant, stand) in &self.stands {
+        for (tenant, feed) in &self.feeds {
             let number = numbers.get(tenant).copied().unwrap_or(0);
             let beat = FeedMessage { v, start, number, sealed: None, plain: None };
-            for Subscribed { socket, .. } in stand.sockets.iter().flatten() {
+            for Subscribed { socket, .. } in feed.sockets.iter().flatten() {
                 self.send(tenant, socket, BEAT.to_owned(), &beat);
             }
         }
     }
 }
 
-impl Drop for Press {
+impl Drop for Publisher {
     fn drop(&mut self) {
         if self.failure.reason().is_some() {
-            self.stands.values_mut().for_each(Stand::close);
+            self.feeds.values_mut().for_each(TenantFeed::close);
         }
     }
 }
 
-impl Stand {
-    /// Ends every connection at once, and what waits for them.
+impl TenantFeed {
+    /// Ends all connections at once, and drops the messages that wait for them.
     fn close(&mut self) {
         for subscribed in self.sockets.iter_mut().filter_map(Option::take) {
-            // Fails for a closed socket only, which this is not.
+            // This fails only for a closed socket, and this one is open.
             let _ = subscribed.socket.set_linger(0);
         }
     }
 
     fn open(&mut self, place: usize, context: &Context, key: &CurveKey, waiting_max: i32) {
-        let gate = Gate::Feed { tenant: self.tenant.clone(), plain: place == 1 };
+        let domain = ZapDomain::Feed { tenant: self.tenant.clone(), plain: place == 1 };
         let endpoint = &self.endpoints[place];
         let open = || -> zmq::Result<(Outlet, String)> {
-            // As PUB, and it tells what is subscribed to.
+            // XPUB is PUB that also tells what is subscribed to.
             let socket = Outlet::new(context.socket(zmq::XPUB)?);
             socket.bound_sending()?;
-            // So that a flood of subscriptions is held up at its connection, and not taken in
-            // before it can be counted.
-            // With 1 libzmq 4.3.5 takes in nothing at all behind a ZAP handler.
+            // So that a flood of subscriptions waits at its connection until it is counted. With 1,
+            // libzmq 4.3.5 reads nothing at all behind a ZAP handler.
             socket.set_rcvhwm(2)?;
-            lock::put_on(&socket, key, &gate.domain())?;
+            lock::put_on(&socket, key, &domain.name())?;
             socket.set_sndhwm(waiting_max)?;
             socket.set_linger(LINGER_MS)?;
             // Subscriptions are all that subscribers may send.
@@ -513,7 +521,7 @@ impl Stand {
                 self.endpoints[place] = bound;
                 self.warned = false;
             }
-            // The one that was closed just now may hold the port for a moment.
+            // The socket that was just closed may keep the port for a moment.
             Err(error) if !self.warned => {
                 tracing::warn!(tenant = %self.tenant, %endpoint, %error, "the feed is not open yet");
                 self.warned = true;
@@ -523,7 +531,7 @@ impl Stand {
     }
 }
 
-/// Bytes of a frame from a subscriber: a topic has 32, what is said at the handshake some 300.
+/// Bytes of a frame from a subscriber. A topic has 32, and a frame of the handshake has about 300.
 const SUBSCRIPTION_BYTES_MAX: i64 = 1_024;
 /// Notifications published before subscriptions are read.
 const HEAR_EVERY: u32 = 64;
@@ -535,7 +543,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_topic_is_the_beat_a_stream_or_how_one_of_them_begins() {
+    fn a_topic_is_the_beat_or_a_stream_or_the_beginning_of_one_of_them() {
         let stream = StreamKey([0xab; 16]).to_hex();
         for topic in ["", "b", "beat", "0", "ab12", &*stream] {
             assert!(is_published(topic.as_bytes()), "{topic}");

@@ -5,107 +5,112 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::counters::{Counters, count};
-use super::door::{Door, Incoming, Keyed, Sender};
 use super::erasures::{Asked, Erasures};
-use super::feed::{Feed, FeedDoor, Views, Watch};
+use super::feed::{Feed, FeedSettings, Views, Watch};
+use super::listener::{Incoming, Keyed, Listener, Sender};
 use super::lock;
 use super::outbox::{Inbox, Outbox};
 use super::passes::Passes;
 use super::rights::{self, Caller};
 use super::unsent::{Parcel, Place, Unsent};
-use super::zap::{Authenticator, Seal};
+use super::zap::{Authenticator, HandshakeSecret};
 use crate::actors::{AnswerTo, Failure, Front, NotTaken, Registrar, Submit, list_tenants};
 use crate::client::wire::{self, Refused};
 use crate::client::{
-    Ask, Context, CurveKey, DoorAsk, Endpoint, ErasedView, ErrorCode, Failed, Ordered, Response,
+    Ask, Context, CurveKey, Endpoint, ErasedView, ErrorCode, Failed, Ordered, Response, ServiceAsk,
     TenantAsk, TenantVerb,
 };
 use crate::ids::{RequestId, TenantId, UserId};
 use crate::limits::{IN_HAND_BYTES_MAX, UNSENT_BYTES_MAX, UNSENT_CONNECTION_BYTES_MAX};
 use crate::sabotage;
 
-/// The doors: one thread that owns their ROUTERs and polls them together with the outbox of the
-/// actors.
+/// The thread that owns the ROUTER sockets. It polls them, and the outbox of the actors.
 #[derive(Debug)]
 pub struct Gateway {
     open: Vec<String>,
-    locked: Vec<String>,
+    keyed: Vec<String>,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
     outbox: Outbox<Outgoing>,
     thread: Option<JoinHandle<()>>,
     feed: Option<Feed>,
-    // After the gateway's thread has closed its sockets: without it handshakes fail open.
+    // Dropped last, when the gateway's thread has closed its sockets: without an authenticator
+    // ZeroMQ accepts every connection.
     _authenticator: Option<Authenticator>,
 }
 
 /// Where a gateway listens.
 #[derive(Debug)]
-pub struct Doors<'a> {
-    /// The name inside the process, in the context it is opened in.
+pub struct Endpoints<'a> {
+    /// The name inside the process, in the gateway's context.
     pub inner: &'a str,
-    /// Without keys: whoever reaches these is the single user of this machine.
+    /// Without keys: every client there is the single user of this machine.
     pub open: &'a [Endpoint],
     /// With keys.
-    pub locked: Option<LockedDoor<'a>>,
+    pub keyed: Option<KeyedEndpoints<'a>>,
 }
 
-/// Where only those come in whose key was admitted.
+/// Endpoints that accept only admitted keys.
 #[derive(Debug)]
-pub struct LockedDoor<'a> {
+pub struct KeyedEndpoints<'a> {
+    /// Where they are.
     pub endpoints: &'a [Endpoint],
+    /// The service's own key.
     pub key: &'a CurveKey,
-    /// Where what becomes durable is published.
-    pub feed: Option<FeedDoor<'a>>,
+    /// The feed, if there is one.
+    pub feed: Option<FeedSettings<'a>>,
 }
 
 /// Why the gateway did not open.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GatewayError {
+    /// The address is in use or does not exist.
     #[error("cannot listen on {endpoint}: {reason}")]
     Bind { endpoint: String, reason: String },
+    /// There are endpoints with keys, and ZeroMQ was built without CURVE.
     #[error(
-        "this build of ZeroMQ has no CURVE, so nobody could tell who is knocking; {}",
+        "this build of ZeroMQ has no CURVE, so the service could not know who connects; {}",
         crate::client::REBUILD_WITH_CURVE
     )]
     NoCurve,
+    /// A socket cannot be made, or a thread does not start.
     #[error("the gateway did not start: {reason}")]
     Start { reason: String },
 }
 
-/// An answer on its way to a peer.
+/// An answer that is to be sent.
 #[derive(Debug)]
 struct Outgoing {
     peer: Peer,
     parcel: Parcel,
 }
 
-/// Whom a message came from. Only a way back: never a proof of who they are.
+/// Where an answer goes. It does not prove who sent the request.
 #[derive(Debug, Clone)]
 struct Peer {
-    /// The place of its door in [`EventLoop::doors`].
-    door: usize,
+    /// The place of its listener in [`EventLoop::listeners`].
+    listener: usize,
     routing_id: Vec<u8>,
-    /// REQ sockets put an empty frame between envelope and message and want it back.
+    /// A REQ socket puts an empty frame before the message, and needs one before the answer.
     delimiter: bool,
-    /// Whose bytes its answers count as; none: of a key that is not admitted any more.
+    /// The tenant whose bytes its answers count as; none if the key is not admitted now.
     tenant: Option<TenantId>,
 }
 
-/// Milliseconds after which a request that met a full gateway may be sent again.
+/// Milliseconds after which a request may be sent again if the gateway was full.
 const RETRY_FULL_MS: u32 = 200;
-/// How long a stop waits for requests that actors already have.
+/// How long a stop waits for the answers to requests that actors already have.
 const DRAIN: Duration = Duration::from_secs(10);
-/// Messages read before answers are sent again, so that neither direction starves.
+/// Messages that are read before answers are sent again, so that neither direction waits too long.
 const BURST: usize = 256;
 
 impl Gateway {
-    /// Opens all of `doors`.
+    /// Listens at all of `endpoints`.
     ///
-    /// - errors: an address that is taken or does not exist; keys wanted where ZeroMQ has none.
+    /// - errors: see [`GatewayError`].
     pub fn open(
         context: &Context,
-        doors: Doors<'_>,
+        endpoints: Endpoints<'_>,
         front: Front,
         registrar: Registrar,
         failure: Failure,
@@ -113,36 +118,36 @@ impl Gateway {
         let start = |reason: String| GatewayError::Start { reason };
         let (outbox, inbox) = Outbox::new().map_err(|error| start(error.to_string()))?;
         let counters = Arc::new(Counters::default());
-        let door = Door::new(context, None)?;
-        door.bind_inner(doors.inner)?;
-        let open = door.bind(doors.open)?;
-        let mut locked = Vec::new();
-        let mut routers = vec![door];
+        let listener = Listener::new(context, None)?;
+        listener.bind_inner(endpoints.inner)?;
+        let open = listener.bind(endpoints.open)?;
+        let mut keyed = Vec::new();
+        let mut listeners = vec![listener];
         let (mut authenticator, mut feed) = (None, None);
-        if let Some(LockedDoor { endpoints, key, feed: wanted }) = doors.locked {
+        if let Some(KeyedEndpoints { endpoints, key, feed: wanted }) = endpoints.keyed {
             lock::check(zmq::has("curve"))?;
-            let (seal, wake) = (Seal::fresh(), outbox.clone());
+            let (secret, wake) = (HandshakeSecret::fresh(), outbox.clone());
             let (admissions, passes) = (registrar.admissions().clone(), Passes::new());
-            let keeper = Authenticator::start(
+            let started = Authenticator::start(
                 context,
-                seal.clone(),
+                secret.clone(),
                 admissions.clone(),
                 passes.clone(),
                 counters.clone(),
                 failure.clone(),
                 move || wake.wake(),
             );
-            authenticator = Some(keeper.map_err(start)?);
+            authenticator = Some(started.map_err(start)?);
             let watch = Watch {
                 admissions: admissions.clone(),
-                seal: seal.clone(),
+                secret: secret.clone(),
                 passes: passes.clone(),
                 counters: counters.clone(),
                 front: front.clone(),
             };
-            let door = Door::new(context, Some(Keyed { key, admissions, seal, passes }))?;
-            locked = door.bind(endpoints)?;
-            routers.push(door);
+            let listener = Listener::new(context, Some(Keyed { key, admissions, secret, passes }))?;
+            keyed = listener.bind(endpoints)?;
+            listeners.push(listener);
             let open = |wanted| Feed::open(context, wanted, key, watch, failure.clone());
             feed = wanted.map(open).transpose()?;
         }
@@ -153,8 +158,8 @@ impl Gateway {
             counters: counters.clone(),
             front: front.clone(),
         };
-        let hall = EventLoop {
-            doors: routers,
+        let event_loop = EventLoop {
+            listeners,
             front,
             registrar,
             erasures: Erasures::new(),
@@ -173,14 +178,14 @@ impl Gateway {
             .spawn(move || {
                 let _alarm = failure.alarm("the gateway's thread ended");
                 let _ = ready.send(());
-                hall.serve(inbox);
+                event_loop.serve(inbox);
             })
             .map_err(|error| start(error.to_string()))?;
         started.recv().map_err(|_| start("its thread ended at once".to_owned()))?;
-        tracing::info!(?open, with_keys = ?locked, "listening");
+        tracing::info!(?open, with_keys = ?keyed, "listening");
         Ok(Gateway {
             open,
-            locked,
+            keyed,
             counters,
             stopping,
             outbox,
@@ -190,26 +195,28 @@ impl Gateway {
         })
     }
 
-    /// The endpoints without keys as they are bound, with the ports that were taken.
+    /// The endpoints without keys, each with its port.
     pub fn open_endpoints(&self) -> &[String] {
         &self.open
     }
 
-    /// The endpoints with keys.
-    pub fn locked_endpoints(&self) -> &[String] {
-        &self.locked
+    /// The endpoints with keys, each with its port.
+    pub fn keyed_endpoints(&self) -> &[String] {
+        &self.keyed
     }
 
-    /// The endpoints of the feed, with their tenants and whether records are in the clear there.
+    /// The endpoints of the feed, each with its tenant and whether its records are decrypted.
     pub fn feed_endpoints(&self) -> Vec<(TenantId, bool, String)> {
         self.feed.as_ref().map(|feed| feed.views().all()).unwrap_or_default()
     }
 
+    /// Counts what comes through the endpoints.
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Takes no more requests, answers those that actors already have, and closes the sockets.
+    /// Refuses new requests, sends the answers to those that actors already have, and closes the
+    /// sockets. Blocks.
     pub fn close(&mut self) {
         self.stopping.store(true, Ordering::SeqCst);
         self.outbox.wake();
@@ -217,7 +224,7 @@ impl Gateway {
             // A panic in there was reported by its alarm.
             let _ = thread.join();
         }
-        // After the last answers: what they say was recorded is published, too.
+        // After the last answers, so that the records of these answers are published, too.
         if let Some(feed) = &mut self.feed {
             feed.close();
         }
@@ -232,7 +239,7 @@ impl Drop for Gateway {
 
 /// What the gateway's thread owns.
 struct EventLoop {
-    doors: Vec<Door>,
+    listeners: Vec<Listener>,
     front: Front,
     registrar: Registrar,
     erasures: Erasures<ErasedView>,
@@ -240,32 +247,32 @@ struct EventLoop {
     failure: Failure,
     counters: Arc<Counters>,
     stopping: Arc<AtomicBool>,
-    /// Requests handed to actors and not yet answered.
+    /// Requests that actors have and have not answered yet.
     in_flight: Arc<AtomicUsize>,
     outbox: Outbox<Outgoing>,
     packer: Packer,
-    /// Bytes of requests handed to actors and not yet answered.
+    /// Bytes of these requests.
     in_hand: Unsent,
 }
 
-/// Gives answers their place among those that have not left the process.
+/// Reserves space for answers until they have left the process.
 #[derive(Clone)]
 struct Packer {
     unsent: Unsent,
-    /// The same, for connections of keys that are not admitted any more.
+    /// The same for connections whose key is not admitted now.
     denials: Unsent,
     counters: Arc<Counters>,
     front: Front,
 }
 
 impl Packer {
-    /// - returns: none when there is no room: the answer is dropped and counted. Asking again with
-    ///   the same request id is always safe.
+    /// - returns: none if there is no space: the answer is dropped and counted. It is always safe
+    ///   to ask again with the same request id.
     fn pack(&self, peer: &Peer, bytes: Vec<u8>) -> Option<Parcel> {
-        let line = Some((peer.door, peer.routing_id.clone()));
+        let connection = Some((peer.listener, peer.routing_id.clone()));
         let parcel = match &peer.tenant {
-            Some(tenant) => self.unsent.pack(tenant, line, bytes),
-            None => self.denials.pack(&TenantId::local(), line, bytes),
+            Some(tenant) => self.unsent.pack(tenant, connection, bytes),
+            None => self.denials.pack(&TenantId::local(), connection, bytes),
         };
         if parcel.is_none() {
             count(&self.counters.unread);
@@ -280,7 +287,7 @@ impl EventLoop {
         let mut stop_by = None;
         loop {
             let timeout_ms = if stop_by.is_some() { 20 } else { 1_000 };
-            let (knocks, bell) = match self.poll(&inbox, timeout_ms) {
+            let (readable, bell) = match self.poll(&inbox, timeout_ms) {
                 Ok(ready) => ready,
                 Err(error) => {
                     self.failure.report(format!("the gateway cannot poll its socket: {error}"));
@@ -292,12 +299,12 @@ impl EventLoop {
                     self.send(outgoing);
                 }
             }
-            // A log that is poisoned acknowledges nothing: whoever asks now gets silence and
-            // retries with the next process, never an answer that nothing stands behind.
+            // If the log is poisoned, no answer may be sent: nothing would prove it. Clients ask
+            // again when the next process runs.
             if self.failure.reason().is_some() {
                 return;
             }
-            for place in knocks {
+            for place in readable {
                 if let Err(error) = self.read(place) {
                     self.failure.report(format!("the gateway cannot read its socket: {error}"));
                     return;
@@ -314,22 +321,25 @@ impl EventLoop {
         }
     }
 
-    /// - returns: the places of the doors that have messages, and whether the outbox has answers.
+    /// - returns: the places of the listeners that have messages, and whether the outbox has
+    ///   answers.
     fn poll(&self, inbox: &Inbox<Outgoing>, timeout_ms: i64) -> zmq::Result<(Vec<usize>, bool)> {
         let mut items = vec![zmq::PollItem::from_fd(inbox.fd(), zmq::POLLIN)];
-        items.extend(self.doors.iter().map(|door| door.socket.as_poll_item(zmq::POLLIN)));
+        items.extend(
+            self.listeners.iter().map(|listener| listener.socket.as_poll_item(zmq::POLLIN)),
+        );
         match zmq::poll(&mut items, timeout_ms) {
             Ok(_) => {}
             Err(zmq::Error::EINTR) => return Ok((Vec::new(), false)),
             Err(error) => return Err(error),
         }
         let readable = |place: &usize| items[place + 1].is_readable();
-        Ok(((0..self.doors.len()).filter(readable).collect(), items[0].is_readable()))
+        Ok(((0..self.listeners.len()).filter(readable).collect(), items[0].is_readable()))
     }
 
     fn read(&self, place: usize) -> zmq::Result<()> {
         for _ in 0..BURST {
-            match self.doors[place].receive() {
+            match self.listeners[place].receive() {
                 Ok(message) => self.take(place, message),
                 Err(zmq::Error::EAGAIN) => return Ok(()),
                 Err(zmq::Error::EINTR) => continue,
@@ -347,22 +357,22 @@ impl EventLoop {
         let Some(routing_id) = frames.next() else { return };
         let mut rest: Vec<Vec<u8>> = frames.collect();
         if let Sender::Unvouched = sender {
-            // Nothing is said to whoever came in although nobody answered their handshake.
-            tracing::warn!("dropped a message from a connection that nobody vouched for");
+            // Not even an error is sent to a connection that was never authenticated.
+            tracing::warn!("dropped a message from a connection that was never authenticated");
             return count(&counters.unvouched);
         }
         let delimiter = rest.len() > 1 && rest[0].is_empty();
         if delimiter {
             rest.remove(0);
         }
-        let own_address = self.doors[place].is_own_address(&routing_id);
+        let own_address = self.listeners[place].is_own_address(&routing_id);
         let tenant = match &sender {
             Sender::Known(caller) => Some(caller.tenant()),
             Sender::NotAdmitted(_) | Sender::Unvouched => None,
         };
-        let peer = Peer { door: place, routing_id, delimiter, tenant };
+        let peer = Peer { listener: place, routing_id, delimiter, tenant };
         if too_many || rest.len() != 1 {
-            // Which of the frames was meant to carry the id cannot be known.
+            // It is not known which of the frames has the id.
             tracing::debug!(frames = rest.len(), "dropped a message that is not one frame");
             return count(&counters.dropped);
         }
@@ -396,7 +406,9 @@ impl EventLoop {
         }
     }
 
-    /// - `bytes`: of the frame that the request was read from.
+    /// Gives a request to whom it is for.
+    ///
+    /// - `bytes`: the size of its frame.
     fn submit(&self, peer: Peer, caller: Caller, request: wire::Request, bytes: usize) {
         let wire::Request { id, user, ask } = request;
         if self.stopping.load(Ordering::SeqCst) {
@@ -415,8 +427,8 @@ impl EventLoop {
                 self.front.submit(Submit { tenant, user, request: id, ask, answer })
             }
             Ask::Archive(ask) => self.front.ask_archive(tenant, ask, answer),
-            Ask::Door(DoorAsk::Hello) => self.front.greet(answer),
-            Ask::Door(DoorAsk::Feed) => return answer.send(self.feed_of(&caller)),
+            Ask::Service(ServiceAsk::Hello) => self.front.greet(answer),
+            Ask::Service(ServiceAsk::Feed) => return answer.send(self.feed_of(&caller)),
             Ask::Order(order) => return self.order(&caller, order, id, answer),
         };
         match taken {
@@ -451,16 +463,16 @@ impl EventLoop {
         answer.send(response);
     }
 
-    /// The way back for an answer that is not here yet.
+    /// Where an actor sends the answer to this request.
     ///
-    /// - `in_hand`: what ends with the answer.
+    /// - `in_hand`: the space of the request; it is free again with the answer.
     fn answer_to(&self, peer: Peer, id: RequestId, in_hand: Place) -> AnswerTo {
         self.in_flight.fetch_add(1, Ordering::SeqCst);
         let (in_flight, outbox) = (self.in_flight.clone(), self.outbox.clone());
         let packer = self.packer.clone();
         AnswerTo::new(move |response| {
             drop(in_hand);
-            // Encoded here, by the actor's thread: the gateway's only carries.
+            // Encoded on the actor's thread, so that the gateway's thread has less to do.
             let bytes = wire::encode_response(id, response);
             if let Some(parcel) = packer.pack(&peer, bytes) {
                 outbox.put(Outgoing { peer, parcel });
@@ -469,7 +481,7 @@ impl EventLoop {
         })
     }
 
-    /// Carries out an order of somebody who may give it.
+    /// Carries out an order. The caller may give it.
     fn order(
         &self,
         caller: &Caller,
@@ -540,14 +552,15 @@ impl EventLoop {
     }
 
     fn send(&self, Outgoing { peer, parcel }: Outgoing) {
-        let door = &self.doors[peer.door];
+        let listener = &self.listeners[peer.listener];
         let mut frames = vec![peer.routing_id];
         if peer.delimiter {
             frames.push(Vec::new());
         }
-        match door.socket.send_parcel(frames, parcel) {
+        match listener.socket.send_parcel(frames, parcel) {
             Ok(()) => count(&self.counters.answered),
-            // Gone, or not reading. A retry with the same id finds the answer in the log.
+            // The client is gone or does not read. If it asks again with the same id, the answer
+            // comes from the log.
             Err(_) => count(&self.counters.undelivered),
         }
     }

@@ -1,4 +1,4 @@
-//! The lock of a door with keys: ZeroMQ's CURVE (RFC 26).
+//! Makes a socket ask for keys: ZeroMQ's CURVE (RFC 26).
 
 use super::GatewayError;
 use crate::client::CurveKey;
@@ -6,9 +6,9 @@ use crate::client::CurveKey;
 /// Milliseconds that a handshake may take; then the connection is closed.
 const HANDSHAKE_MS: i32 = 10_000;
 
-/// Without CURVE nobody could tell who is knocking, so nobody beyond this machine may knock.
+/// Checks that ZeroMQ has CURVE. Without it the service cannot know who connects.
 ///
-/// - `has`: what `zmq::has("curve")` says.
+/// - `has`: the result of `zmq::has("curve")`.
 pub(super) fn check(has: Option<bool>) -> Result<(), GatewayError> {
     match has {
         Some(true) => Ok(()),
@@ -16,10 +16,10 @@ pub(super) fn check(has: Option<bool>) -> Result<(), GatewayError> {
     }
 }
 
-/// Makes whoever connects to `socket` prove which key they have. Before it is bound; and only the
-/// [`super::zap::Authenticator`] holds those keys against the register.
+/// Makes every client of `socket` prove which key it has. Call it before the socket is bound. CURVE
+/// does not decide which keys are accepted; the [`super::zap::Authenticator`] does.
 ///
-/// - `domain`: what the authenticator is told of where they knock.
+/// - `domain`: names the socket in the questions to the authenticator.
 pub(super) fn put_on(socket: &zmq::Socket, key: &CurveKey, domain: &str) -> zmq::Result<()> {
     socket.set_curve_server(true)?;
     socket.set_curve_publickey(&key.public().0)?;
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_curve_the_refusal_says_how_to_mend_it() {
+    fn without_curve_the_refusal_says_how_to_get_it() {
         for has in [None, Some(false)] {
             let error = check(has).unwrap_err().to_string();
             assert!(error.contains("CURVE") && error.contains("deploy/libzmq"), "{error}");

@@ -1,11 +1,11 @@
-//! The edge: speaks ZeroMQ, translates wire messages to requests and answers back. The wire is
-//! described for strangers in `schema/wire.md`.
+//! The service's end of the wire: receives requests over ZeroMQ, decides who may ask what, and
+//! sends the answers. Publishes the feed. `schema/wire.md` describes the wire for other programs.
 
 mod counters;
-mod door;
 mod erasures;
 mod feed;
 mod gateway;
+mod listener;
 mod lock;
 mod outbox;
 mod passes;
@@ -16,5 +16,5 @@ mod unsent;
 mod zap;
 
 pub use counters::{Counters, Counts};
-pub use feed::FeedDoor;
-pub use gateway::{Doors, Gateway, GatewayError, LockedDoor};
+pub use feed::FeedSettings;
+pub use gateway::{Endpoints, Gateway, GatewayError, KeyedEndpoints};

@@ -5,21 +5,22 @@ use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What actors hand to the gateway's thread, and how they wake it: a socket has one owner, so they
-/// cannot send themselves. Bounded by the gateway's own count of requests in flight: each request
-/// puts one answer here and no more.
+/// A queue of answers from the actors to the gateway's thread, which it wakes. Only that thread may
+/// use the sockets. The queue is bounded by the number of requests in flight, because each request
+/// puts exactly one answer into it.
 #[derive(Debug)]
 pub(super) struct Outbox<T>(Arc<Inner<T>>);
 
 #[derive(Debug)]
 struct Inner<T> {
     queue: Mutex<VecDeque<T>>,
-    /// A wake-up is under way: no second byte is needed.
+    /// A byte to wake the reader was written and not read yet.
     woken: AtomicBool,
+    /// A byte in it wakes the reader.
     bell: UnixStream,
 }
 
-/// The gateway's end: what it polls and drains.
+/// The reader's end of an [`Outbox`], which it polls and drains.
 #[derive(Debug)]
 pub(super) struct Inbox<T> {
     outbox: Outbox<T>,
@@ -50,7 +51,7 @@ impl<T> Outbox<T> {
 
     pub fn wake(&self) {
         if !self.0.woken.swap(true, Ordering::SeqCst) {
-            // A full pipe holds a wake-up already; a closed one has nobody to wake.
+            // A full pipe wakes the reader already. A closed pipe has no reader.
             let _ = (&self.0.bell).write(&[1]);
         }
     }
@@ -65,9 +66,8 @@ impl<T> Inbox<T> {
     pub fn drain(&mut self) -> VecDeque<T> {
         let mut bytes = [0; 64];
         while matches!(self.ear.read(&mut bytes), Ok(read) if read == bytes.len()) {}
-        // Cleared *before* the queue is taken: what is put in from now on rings again, and what
-        // was put in before is taken below. The other way round, an item put in between would
-        // neither ring nor be taken.
+        // Cleared *before* the queue is taken: a later item wakes the reader again, and an earlier
+        // item is taken below. In the other order, an item put in between would do neither.
         self.outbox.0.woken.store(false, Ordering::SeqCst);
         std::mem::take(&mut *self.outbox.0.queue.lock().unwrap_or_else(PoisonError::into_inner))
     }

@@ -1,7 +1,7 @@
-//! Which connections were let in and may still be there. ZeroMQ asks who may come in and does not
-//! say who has left. So each connection gets a number at its handshake; its first message tells
-//! which descriptor it has in this process; and when somebody asks for more connections than they
-//! may have, it is looked which of those are still open.
+//! Counts open connections, and limits them. ZeroMQ asks before it accepts a connection and does
+//! not tell when one ends. So each connection gets a number at its handshake. Its first message
+//! shows its file descriptor in this process. When a key or a tenant has too many connections, this
+//! file looks which of their descriptors are still open.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -15,21 +15,22 @@ use crate::limits::{
     CUT_OFF_S, DOOR_CONNECTIONS_MAX, FEED_CONNECTIONS_MAX, KEY_CONNECTIONS_MAX, KEY_FOLLOWERS_MAX,
 };
 
-/// The connections of the door with keys and of the feed.
+/// The connections of the endpoints with keys, and of the feed.
 #[derive(Debug, Clone)]
 pub(super) struct Passes(Arc<Mutex<Held>>);
 
 #[derive(Debug)]
 struct Held {
     last: u64,
-    /// The door's, and the feed's.
+    /// Of the endpoints with keys, and of the feed.
     rooms: [Room; 2],
     open: BTreeMap<u64, Pass>,
-    /// Keys that are kept from the feed, and until when.
+    /// Keys that may not connect to the feed, each with the end of that time.
     cut_off: BTreeMap<PublicKey, Instant>,
     looked: Option<Instant>,
 }
 
+/// One connection.
 #[derive(Debug)]
 struct Pass {
     feed: bool,
@@ -40,16 +41,16 @@ struct Pass {
     socket: Option<Socket>,
 }
 
-/// A descriptor, and what the system says it is.
+/// A file descriptor, and the name that the operating system gives it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Socket {
     descriptor: i32,
     name: String,
 }
 
-/// Between two looks at what is open: a look costs about a millisecond.
+/// The time between two looks at the open descriptors. A look takes about a millisecond.
 const LOOK_AGAIN: Duration = Duration::from_millis(100);
-/// Where the system does not tell what is open, a connection counts for so long.
+/// How long a connection counts if the operating system does not show open descriptors.
 const BLIND: Duration = Duration::from_secs(60);
 
 impl Passes {
@@ -59,9 +60,9 @@ impl Passes {
         Passes(Arc::new(Mutex::new(Held { last: 0, rooms, open, cut_off, looked: None })))
     }
 
-    /// Takes a place for a connection that is being made.
+    /// Counts a new connection.
     ///
-    /// - returns: its number; none when its key, its tenant or all together have too many.
+    /// - returns: its number; none if its key, its tenant or all tenants together have too many.
     pub fn issue(&self, feed: bool, tenant: &TenantId, key: &PublicKey) -> Option<u64> {
         let mut held = self.held();
         if held.take(feed, tenant, key) {
@@ -76,7 +77,7 @@ impl Passes {
         held.take(feed, tenant, key).then(|| held.issue(feed, tenant, key))
     }
 
-    /// Notes which descriptor a connection has; to be called with its first message.
+    /// Notes the file descriptor of a connection. Call it with the first message.
     pub fn seen(&self, number: u64, descriptor: i32) {
         let mut held = self.held();
         let Some(pass) = held.open.get_mut(&number).filter(|pass| pass.socket.is_none()) else {
@@ -85,17 +86,18 @@ impl Passes {
         pass.socket = name_of(descriptor).map(|name| Socket { descriptor, name });
     }
 
-    /// Whether a connection's descriptor is still to be noted.
+    /// True if the file descriptor of a connection was not noted yet.
     pub fn is_new(&self, number: u64) -> bool {
         self.held().open.get(&number).is_some_and(|pass| pass.socket.is_none())
     }
 
-    /// Keeps a key from the feed for [`CUT_OFF_S`].
+    /// Keeps a key from the feed for [`CUT_OFF_S`] seconds.
     pub fn cut_off(&self, key: PublicKey) {
         let until = Instant::now() + Duration::from_secs(CUT_OFF_S);
         self.held().cut_off.insert(key, until);
     }
 
+    /// True if the key is kept from the feed now.
     pub fn is_cut_off(&self, key: &PublicKey) -> bool {
         let mut held = self.held();
         let now = Instant::now();
@@ -103,7 +105,7 @@ impl Passes {
         held.cut_off.contains_key(key)
     }
 
-    // Its holders leave it whole whenever they return.
+    // A panic while the lock is held leaves nothing half changed.
     fn held(&self) -> MutexGuard<'_, Held> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -123,7 +125,10 @@ impl Held {
         self.last
     }
 
-    /// - `sockets`: what is open in this process; none when the system does not tell.
+    /// Stops counting the connections that have ended.
+    ///
+    /// - `sockets`: the open sockets of this process; none if the operating system does not show
+    ///   them.
     fn forget_the_gone(&mut self, sockets: Option<&BTreeSet<Socket>>, now: Instant) {
         let gone: Vec<u64> = match sockets {
             None => {
@@ -137,8 +142,8 @@ impl Held {
                     open.map(|(number, _)| *number).collect::<Vec<u64>>()
                 };
                 let (there, mut gone, mute) = (of(Some(true)), of(Some(false)), of(None));
-                // Which sockets are those that said nothing is not known, but how many there can be:
-                // the oldest beyond that are gone.
+                // The sockets of connections without a message are not known, but their number is
+                // bounded by the sockets that are left. The oldest beyond that number are gone.
                 let others = sockets.len().saturating_sub(there.len());
                 gone.extend(&mute[..mute.len().saturating_sub(others)]);
                 gone
@@ -153,7 +158,7 @@ impl Held {
 
 const DESCRIPTORS: &str = "/proc/self/fd";
 
-/// The sockets of this process; none where the system has no such directory.
+/// The open sockets of this process; none if the operating system has no such directory.
 fn open_sockets() -> Option<BTreeSet<Socket>> {
     let entries = fs::read_dir(DESCRIPTORS).ok()?;
     let socket = |entry: fs::DirEntry| {
@@ -163,7 +168,7 @@ fn open_sockets() -> Option<BTreeSet<Socket>> {
     Some(entries.filter_map(Result::ok).filter_map(socket).collect())
 }
 
-/// `socket:[NUMBER]`, with a number that no other socket has.
+/// `socket:[NUMBER]`, with a number that no other socket has; none if it is not a socket.
 fn name_of(descriptor: i32) -> Option<String> {
     let path = Path::new(DESCRIPTORS).join(descriptor.to_string());
     let name = fs::read_link(path).ok()?.to_str()?.to_owned();
@@ -185,14 +190,14 @@ mod tests {
         PublicKey([number; 32])
     }
 
-    /// Without a look at the sockets of this process: other tests open and close them.
+    /// It does not look at the sockets of this process, because other tests open and close some.
     fn unwatched() -> Passes {
         let passes = Passes::new();
         passes.held().looked = Some(Instant::now());
         passes
     }
 
-    /// Lets in as many as it can, with keys of their own for every ten.
+    /// Opens as many connections as it can, with another key for every ten.
     fn fill(passes: &Passes, tenant: &TenantId) -> Vec<u64> {
         let issue = |n: usize| passes.issue(false, tenant, &key((n / 10) as u8));
         (0..1_000).map_while(issue).collect()
@@ -211,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_left_makes_room_and_who_is_there_does_not() {
+    fn an_ended_connection_makes_room_and_an_open_one_does_not() {
         let passes = unwatched();
         let numbers = fill(&passes, &lab("a"));
         let pairs: Vec<_> = numbers.iter().map(|_| UnixStream::pair().unwrap()).collect();
@@ -221,7 +226,7 @@ mod tests {
             assert!(!passes.is_new(*number));
         }
         let more = || {
-            // As long after the last look as a look needs.
+            // As if the last look was long ago.
             passes.held().looked = None;
             passes.issue(false, &lab("a"), &key(200))
         };
@@ -232,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn of_those_that_said_nothing_as_many_are_forgotten_as_cannot_be_there() {
+    fn connections_without_a_message_are_forgotten_if_there_are_fewer_sockets() {
         let mut held = Held {
             last: 0,
             rooms: [10, 10].map(Room::new),
@@ -249,7 +254,7 @@ mod tests {
         held.open.get_mut(&1).unwrap().socket = Some(socket(1));
         held.open.get_mut(&2).unwrap().socket = Some(socket(2));
         let now = Instant::now();
-        // The first is there, the second is not, and four are whose nobody knows.
+        // The first is open, the second is not, and four sockets are of unknown connections.
         let there = BTreeSet::from([1, 11, 12, 13, 14].map(socket));
         held.forget_the_gone(Some(&there), now);
         assert_eq!(held.open.keys().copied().collect::<Vec<_>>(), [1, 7, 8, 9, 10]);

@@ -1,5 +1,5 @@
-//! The few calls of `libzmq` that the `zmq` crate does not offer. The only unsafe code of the doors;
-//! none of it looks at bytes from outside.
+//! The few calls of `libzmq` that the `zmq` crate does not offer. It is the only unsafe code of the
+//! frontends, and it reads no byte from outside.
 
 use std::ffi::c_void;
 use std::ops::Deref;
@@ -32,10 +32,10 @@ impl Outlet {
         Outlet { socket, handle }
     }
 
-    /// Sends `frames`, and a parcel as the last frame of their message, without waiting. The
-    /// parcel's place is given back when `libzmq` has no more use for its bytes.
+    /// Sends `frames`, and a parcel as the last frame of the message. Does not wait. The space of
+    /// the parcel is free again when `libzmq` no longer needs its bytes.
     ///
-    /// - errors: as [`zmq::Socket::send`]; the parcel is then gone.
+    /// - errors: as [`zmq::Socket::send`]; then the parcel is dropped.
     pub fn send_parcel(&self, frames: Vec<Vec<u8>>, parcel: Parcel) -> zmq::Result<()> {
         for frame in frames {
             self.socket.send(frame, zmq::DONTWAIT | zmq::SNDMORE)?;
@@ -43,7 +43,7 @@ impl Outlet {
         send(self.handle, parcel)
     }
 
-    /// Bounds what the kernel keeps for each network connection, and for how long:
+    /// Limits how many bytes the kernel keeps for each network connection, and for how long:
     /// [`SEND_BUFFER_BYTES`] and [`UNREAD_S_MAX`].
     pub fn bound_sending(&self) -> zmq::Result<()> {
         self.socket.set_sndbuf(SEND_BUFFER_BYTES)?;
@@ -87,7 +87,7 @@ fn send(socket: *mut c_void, parcel: Parcel) -> zmq::Result<()> {
     Err(error)
 }
 
-/// Frees a parcel, on whichever thread libzmq is done with it.
+/// Frees a parcel. libzmq calls it on any of its threads.
 unsafe extern "C" fn let_go(_data: *mut c_void, hint: *mut c_void) {
     // SAFETY: `hint` came from `Box::into_raw` in `send`, and this is called once for it.
     drop(unsafe { Box::from_raw(hint.cast::<Parcel>()) });
@@ -105,7 +105,7 @@ mod tests {
     use crate::ids::TenantId;
 
     #[test]
-    fn a_parcel_gives_its_place_back_when_it_was_read_and_when_nobody_is_there() {
+    fn a_parcel_gives_its_space_back_when_it_was_read_and_when_the_peer_is_gone() {
         let context = zmq::Context::new();
         let router = Outlet::new(context.socket(zmq::ROUTER).unwrap());
         router.set_router_mandatory(true).unwrap();
@@ -121,7 +121,7 @@ mod tests {
         let (unsent, lab) = (Unsent::new(BYTES + 1_000), TenantId::local());
         let take = || unsent.pack(&lab, Some((0, id.clone())), vec![7; BYTES]);
         for round in 0..20 {
-            // There is room for one: the place of the former one was given back.
+            // There is space for one, so the former one gave its space back.
             let parcel = (0..10_000).find_map(|_| {
                 std::thread::yield_now();
                 take()
@@ -129,8 +129,8 @@ mod tests {
             router.send_parcel(vec![id.clone()], parcel.expect("room")).unwrap();
             assert_eq!(dealer.recv_bytes(0).unwrap(), vec![7; BYTES], "round {round}");
         }
-        let nobody = router.send_parcel(vec![b"nobody".to_vec()], take().expect("room"));
-        assert_eq!(nobody, Err(zmq::Error::EHOSTUNREACH));
+        let gone = router.send_parcel(vec![b"nobody".to_vec()], take().expect("room"));
+        assert_eq!(gone, Err(zmq::Error::EHOSTUNREACH));
         assert!(take().is_some(), "what was not sent takes no room");
     }
 }

@@ -1,22 +1,24 @@
-//! Who may ask what. The table stands in `schema/wire.md` too.
+//! Who may ask what. `schema/wire.md` has the same table.
 
 use crate::client::{
-    ArchiveAsk, Ask, DoorAsk, ErrorCode, Failed, Order, PersonAsk, TenantAsk, TenantVerb,
+    ArchiveAsk, Ask, ErrorCode, Failed, Order, PersonAsk, ServiceAsk, TenantAsk, TenantVerb,
 };
 use crate::ids::TenantId;
 use crate::tenancy::{Admitted, Role};
 
-/// Who a message is from, as its door vouches: nothing in the message has a say in it.
+/// Who sent a message. The endpoint and the key of the connection decide it, and nothing in the
+/// message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Caller {
-    /// Whoever reaches a door without keys: the single user of this machine, who is tenant `local`
-    /// and may do everything.
+    /// A client of an endpoint without keys: the single user of this machine, tenant `local`, who
+    /// may ask everything.
     Local,
+    /// A client with an admitted key.
     Keyed(Admitted),
 }
 
 impl Caller {
-    /// Whether one of these roles is the caller's.
+    /// True if the caller has one of these roles.
     pub fn is_one_of(&self, roles: &[Role]) -> bool {
         match self {
             Caller::Local => true,
@@ -31,8 +33,10 @@ impl Caller {
         }
     }
 
-    /// - errors: the role that is needed, when the caller's is another one; an order about more
-    ///   than the caller's own.
+    /// Checks that the caller may ask this.
+    ///
+    /// - errors: the caller has another role than is needed, or the order is about more than the
+    ///   caller's own tenant.
     pub fn may(&self, ask: &Ask) -> Result<(), Failed> {
         let Caller::Keyed(Admitted { role: held, .. }) = self else { return Ok(()) };
         let needed = roles_for(ask);
@@ -48,8 +52,9 @@ impl Caller {
         }
     }
 
-    /// The operators of the whole host are those of tenant `local`; another tenant's decide about
-    /// its keys, erase its people and see its quotas. They do not set them: quotas protect the others from it.
+    /// True for operators of tenant `local`, who are the operators of the host. Operators of
+    /// another tenant manage its keys, erase its people and see its quotas. They do not set its
+    /// quotas, which protect the other tenants.
     pub fn is_host(&self) -> bool {
         self.tenant() == TenantId::local()
     }
@@ -75,14 +80,14 @@ impl Caller {
     }
 }
 
-/// A key that was never admitted, is retired, or belongs to a tenant that is disabled. Which of
-/// them is the operator's business: the sentence says the same for all.
+/// The refusal of a key that was never admitted, is retired, or belongs to a disabled tenant. The
+/// sentence is the same for all three, because a stranger must not learn which keys exist.
 pub(super) fn not_admitted() -> Failed {
-    denied("your key is not admitted here; ask whoever runs the service".to_owned())
+    denied("your key is not admitted here; ask the operator of the service".to_owned())
 }
 
-/// A connection that chose its own routing id. Answers are addressed by it, and a chosen one can be
-/// taken by somebody else as soon as its owner is gone.
+/// The refusal of a connection that chose its own routing id. Answers are addressed to this id, and
+/// another client can choose the same id later.
 pub(super) fn routing_id_chosen() -> Failed {
     denied("leave the routing id of your socket unset; answers could reach another".to_owned())
 }
@@ -91,19 +96,19 @@ pub(super) fn denied(message: String) -> Failed {
     Failed { code: ErrorCode::Denied, message }
 }
 
-/// Who may have sealed records. A gateway may not: it vouches for its own people only, and records
-/// are of all.
+/// Roles that may read encrypted records. A gateway speaks for its own people only, and the records
+/// are of all people of the tenant.
 pub(super) const SEALED: &[Role] = &[Role::Operator, Role::Auditor];
-/// Who may have records in the clear.
+/// Roles that may read decrypted records.
 pub(super) const PLAIN: &[Role] = &[Role::Operator];
 
-/// People's words are for their gateway and, for help, their operator; an auditor sees sealed
-/// records only.
+/// A gateway sees what its people say. So does an operator, who helps them. An auditor sees
+/// encrypted records only.
 fn roles_for(ask: &Ask) -> &'static [Role] {
     match ask {
-        Ask::Door(DoorAsk::Hello) => &[Role::Gateway, Role::Operator, Role::Auditor],
+        Ask::Service(ServiceAsk::Hello) => &[Role::Gateway, Role::Operator, Role::Auditor],
         Ask::Archive(ArchiveAsk::Plain { .. }) => PLAIN,
-        Ask::Archive(_) | Ask::Door(DoorAsk::Feed) => SEALED,
+        Ask::Archive(_) | Ask::Service(ServiceAsk::Feed) => SEALED,
         Ask::Person(PersonAsk::Query(_) | PersonAsk::Wait { .. }) => {
             &[Role::Gateway, Role::Operator]
         }
@@ -125,11 +130,11 @@ mod tests {
         let tenant = TenantId::new("lab").unwrap();
         let keyed = |role| Caller::Keyed(Admitted { tenant: tenant.clone(), role });
         let asks = [
-            DoorAsk::Hello.into(),
+            ServiceAsk::Hello.into(),
             Query::Known.into(),
             Ask::Person(PersonAsk::Wait { seconds: 1 }),
             Command::Done.into(),
-            DoorAsk::Feed.into(),
+            ServiceAsk::Feed.into(),
             Ask::Archive(ArchiveAsk::Heads { after: None, limit: 1 }),
             Ask::Archive(ArchiveAsk::Sealed {
                 stream: StreamKey::TENANT,

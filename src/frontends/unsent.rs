@@ -1,7 +1,7 @@
-//! What was made to be sent and has not left the process. `libzmq` counts what waits in messages, of
-//! which one may be a thousand times another, and does not say what waits. So each frame carries the
-//! place that its bytes take, and gives it back when `libzmq` lets go of the bytes: the frame was
-//! encrypted or written, or its connection has ended.
+//! Counts the bytes that wait to be sent, and limits them. `libzmq` limits messages, not bytes, and
+//! does not tell how many wait. So each frame reserves space for its bytes. It gives the space back
+//! when `libzmq` frees the bytes: they were encrypted or written, or the connection has ended. See
+//! ADR 20.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,59 +10,75 @@ use crate::fairness::Room;
 use crate::ids::TenantId;
 use crate::limits::UNSENT_CONNECTION_BYTES_MAX;
 
-/// A connection, by its door and routing id.
-pub(super) type Line = (usize, Vec<u8>);
+/// A connection: the place of its listener, and its routing id.
+pub(super) type ConnectionId = (usize, Vec<u8>);
 
-/// The bytes that wait, by connection and by tenant.
+/// The bytes that wait, for each connection and each tenant.
 #[derive(Debug, Clone)]
 pub(super) struct Unsent(Arc<Mutex<Held>>);
 
 #[derive(Debug)]
 struct Held {
     tenants: Room,
-    lines: HashMap<Line, usize>,
+    connections: HashMap<ConnectionId, usize>,
 }
 
-/// Bytes with their place among those that wait.
+/// Bytes with the space that is reserved for them.
 #[derive(Debug)]
 pub(super) struct Parcel {
     pub bytes: Vec<u8>,
     _place: Place,
 }
 
-/// Room for so many bytes, until it is dropped.
+/// Space for some bytes. It is free again when this is dropped.
 #[derive(Debug)]
 pub(super) struct Place {
     unsent: Unsent,
     tenant: TenantId,
-    line: Option<Line>,
+    connection: Option<ConnectionId>,
     amount: usize,
 }
 
-/// Bytes that a frame takes beside its own: those of `libzmq`'s and our bookkeeping.
+/// Bytes that `libzmq` and this file need for a frame beside its content.
 const FRAME_COST: usize = 256;
 
 impl Unsent {
-    /// - `most`: bytes of one tenant alone; several together have less than twice as many.
+    /// - `most`: bytes of one tenant, if no other has any. All tenants together have less than
+    ///   twice as many.
     pub fn new(most: usize) -> Unsent {
-        Unsent(Arc::new(Mutex::new(Held { tenants: Room::new(most), lines: HashMap::new() })))
+        Unsent(Arc::new(Mutex::new(Held { tenants: Room::new(most), connections: HashMap::new() })))
     }
 
-    /// [`Unsent::place`] for `bytes`, and the bytes with it.
-    pub fn pack(&self, tenant: &TenantId, line: Option<Line>, bytes: Vec<u8>) -> Option<Parcel> {
-        let place = self.place(tenant, line, bytes.len())?;
+    /// Reserves space for `bytes`, as [`Unsent::place`].
+    pub fn pack(
+        &self,
+        tenant: &TenantId,
+        connection: Option<ConnectionId>,
+        bytes: Vec<u8>,
+    ) -> Option<Parcel> {
+        let place = self.place(tenant, connection, bytes.len())?;
         Some(Parcel { bytes, _place: place })
     }
 
-    /// Takes a place for so many bytes.
+    /// Reserves space for so many bytes.
     ///
-    /// - `line`: the connection that they are for; none for what goes to many.
-    /// - returns: none when there is no room. One connection may take as much as it leaves free to
-    ///   the others of its tenant, and [`UNSENT_CONNECTION_BYTES_MAX`] in all, or one frame.
-    pub fn place(&self, tenant: &TenantId, line: Option<Line>, bytes: usize) -> Option<Place> {
+    /// - `connection`: the connection that they are for; none if they are for many.
+    /// - returns: none if there is no space. One connection gets at most
+    ///   [`UNSENT_CONNECTION_BYTES_MAX`], and at most as much as it leaves free for the other
+    ///   connections of its tenant. It always gets one frame.
+    pub fn place(
+        &self,
+        tenant: &TenantId,
+        connection: Option<ConnectionId>,
+        bytes: usize,
+    ) -> Option<Place> {
         let amount = bytes + FRAME_COST;
         let mut held = self.held();
-        let waiting = line.as_ref().and_then(|line| held.lines.get(line)).copied().unwrap_or(0);
+        let waiting = connection
+            .as_ref()
+            .and_then(|connection| held.connections.get(connection))
+            .copied()
+            .unwrap_or(0);
         let after = waiting + amount;
         if waiting > 0 {
             let left = held.tenants.free_for(tenant).saturating_sub(amount);
@@ -73,14 +89,14 @@ impl Unsent {
         if !held.tenants.take(tenant, amount) {
             return None;
         }
-        if let Some(line) = &line {
-            held.lines.insert(line.clone(), after);
+        if let Some(connection) = &connection {
+            held.connections.insert(connection.clone(), after);
         }
         let (unsent, tenant) = (self.clone(), tenant.clone());
-        Some(Place { unsent, tenant, line, amount })
+        Some(Place { unsent, tenant, connection, amount })
     }
 
-    // Its holders leave it whole whenever they return.
+    // A panic while the lock is held leaves nothing half changed.
     fn held(&self) -> MutexGuard<'_, Held> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -90,11 +106,11 @@ impl Drop for Place {
     fn drop(&mut self) {
         let mut held = self.unsent.held();
         held.tenants.give_back(&self.tenant, self.amount);
-        let Some(line) = &self.line else { return };
-        if let Some(waiting) = held.lines.get_mut(line) {
+        let Some(connection) = &self.connection else { return };
+        if let Some(waiting) = held.connections.get_mut(connection) {
             *waiting = waiting.saturating_sub(self.amount);
             if *waiting == 0 {
-                held.lines.remove(line);
+                held.connections.remove(connection);
             }
         }
     }
@@ -112,8 +128,8 @@ mod tests {
     }
 
     /// As many frames as one connection gets.
-    fn fill(unsent: &Unsent, tenant: &TenantId, line: u8) -> Vec<Parcel> {
-        let take = || unsent.pack(tenant, Some((0, vec![line])), vec![0; FRAME]);
+    fn fill(unsent: &Unsent, tenant: &TenantId, connection: u8) -> Vec<Parcel> {
+        let take = || unsent.pack(tenant, Some((0, vec![connection])), vec![0; FRAME]);
         std::iter::from_fn(take).collect()
     }
 
@@ -121,7 +137,7 @@ mod tests {
     fn a_connection_that_does_not_read_gets_its_share_and_leaves_some_to_the_next() {
         let (unsent, lab) = (Unsent::new(MOST), lab("lab"));
         let share = UNSENT_CONNECTION_BYTES_MAX / (FRAME + FRAME_COST);
-        let all: Vec<_> = (0..100).map(|line| fill(&unsent, &lab, line)).collect();
+        let all: Vec<_> = (0..100).map(|connection| fill(&unsent, &lab, connection)).collect();
         assert_eq!((all[0].len(), all[1].len()), (share, share));
         assert!((1..share).contains(&all[4].len()), "{} of {share}", all[4].len());
         let bytes = |frames: &Vec<Parcel>| frames.len() * (FRAME + FRAME_COST);
@@ -130,13 +146,13 @@ mod tests {
         assert!(small.is_some(), "a client that reads gets the usual answer");
         drop((all, small));
         assert_eq!(fill(&unsent, &lab, 9).len(), share, "what was given back is there again");
-        assert!(unsent.held().lines.is_empty(), "nothing is kept of connections that read");
+        assert!(unsent.held().connections.is_empty(), "nothing is kept of connections that read");
     }
 
     #[test]
     fn a_lab_whose_connections_do_not_read_takes_nothing_from_another() {
         let (unsent, loud, quiet) = (Unsent::new(MOST), lab("loud"), lab("quiet"));
-        let held: Vec<_> = (0..200).map(|line| fill(&unsent, &loud, line)).collect();
+        let held: Vec<_> = (0..200).map(|connection| fill(&unsent, &loud, connection)).collect();
         assert!(unsent.pack(&loud, Some((0, vec![255])), vec![0; 2 * FRAME]).is_none());
         assert!(unsent.pack(&loud, None, vec![0; 2 * FRAME]).is_none());
         assert!(unsent.pack(&quiet, Some((0, vec![254])), vec![0; MOST / 3]).is_some());
@@ -146,11 +162,14 @@ mod tests {
     #[test]
     fn one_frame_may_be_larger_than_a_connections_share() {
         let (unsent, lab) = (Unsent::new(MOST), lab("lab"));
-        let line = || Some((0, vec![1]));
-        let large = unsent.pack(&lab, line(), vec![0; 2 * UNSENT_CONNECTION_BYTES_MAX]);
-        assert!(large.is_some() && unsent.pack(&lab, line(), vec![0; 10]).is_none());
+        let connection = || Some((0, vec![1]));
+        let large = unsent.pack(&lab, connection(), vec![0; 2 * UNSENT_CONNECTION_BYTES_MAX]);
+        assert!(large.is_some() && unsent.pack(&lab, connection(), vec![0; 10]).is_none());
         drop(large);
-        assert!(unsent.pack(&lab, line(), vec![0; 10]).is_some());
-        assert!(unsent.pack(&lab, line(), vec![0; MOST]).is_none(), "a lab's share is a bound");
+        assert!(unsent.pack(&lab, connection(), vec![0; 10]).is_some());
+        assert!(
+            unsent.pack(&lab, connection(), vec![0; MOST]).is_none(),
+            "a lab's share is a bound"
+        );
     }
 }

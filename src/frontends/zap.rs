@@ -1,9 +1,9 @@
-//! Who is let in: ZeroMQ asks for each connection at the door with keys (ZAP, RFC 27), and a thread
-//! of its own answers from the register of admitted keys.
+//! Decides which connections are accepted. ZeroMQ asks for each connection at an endpoint with keys
+//! (ZAP, RFC 27), and a thread answers from the register of admitted keys.
 //!
-//! Three things keep a stranger out, each of them enough: the answer to the handshake; the register,
-//! which is asked again for each message, so that an open connection ends with its key; and the
-//! [`Seal`], because a server whose ZAP thread is gone would let everybody in.
+//! Three things keep a stranger out, and each of them is enough: the answer to the handshake; the
+//! register, which is asked again for each message, so that an open connection ends with its key;
+//! and the [`HandshakeSecret`], because ZeroMQ accepts every connection if the ZAP thread has died.
 
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -18,46 +18,47 @@ use crate::ids::{PublicKey, TenantId};
 use crate::sabotage;
 use crate::tenancy::{Admissions, Admitted};
 
-/// Where ZeroMQ looks for whoever answers; one for each context.
+/// Where ZeroMQ sends its questions. Each context has one.
 const ADDRESS: &str = "inproc://zeromq.zap.01";
-/// Names the door with keys in ZeroMQ's questions.
+/// Names the endpoint for requests in ZeroMQ's questions.
 pub(super) const DOMAIN: &str = "apprentice";
 
-/// Where somebody knocks: ZeroMQ's word is *domain*.
+/// What a client connects to. ZeroMQ calls it the *domain* of a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Gate {
-    /// The door with keys, where each message is held against the register again.
-    Door,
-    /// One tenant's feed of sealed records, or of plain ones. What comes out of it is held against
-    /// nothing any more: only those get in who may have all of it.
+pub(super) enum ZapDomain {
+    /// The endpoint for requests. Each message there is compared with the register again.
+    Requests,
+    /// One tenant's feed of encrypted records, or of decrypted ones. Its messages are not checked
+    /// one by one, so only those may connect who may read all of it.
     Feed { tenant: TenantId, plain: bool },
 }
 
-impl Gate {
-    pub fn domain(&self) -> String {
+impl ZapDomain {
+    pub fn name(&self) -> String {
         match self {
-            Gate::Door => DOMAIN.to_owned(),
-            Gate::Feed { tenant, plain: false } => format!("{SEALED_FEED}{tenant}"),
-            Gate::Feed { tenant, plain: true } => format!("{PLAIN_FEED}{tenant}"),
+            ZapDomain::Requests => DOMAIN.to_owned(),
+            ZapDomain::Feed { tenant, plain: false } => format!("{SEALED_FEED}{tenant}"),
+            ZapDomain::Feed { tenant, plain: true } => format!("{PLAIN_FEED}{tenant}"),
         }
     }
 
-    fn read(domain: &[u8]) -> Option<Gate> {
-        let domain = std::str::from_utf8(domain).ok()?;
+    fn read(name: &[u8]) -> Option<ZapDomain> {
+        let name = std::str::from_utf8(name).ok()?;
         let feed = |prefix, plain| {
-            let tenant = TenantId::new(domain.strip_prefix(prefix)?).ok()?;
-            Some(Gate::Feed { tenant, plain })
+            let tenant = TenantId::new(name.strip_prefix(prefix)?).ok()?;
+            Some(ZapDomain::Feed { tenant, plain })
         };
-        match domain == DOMAIN {
-            true => Some(Gate::Door),
+        match name == DOMAIN {
+            true => Some(ZapDomain::Requests),
             false => feed(SEALED_FEED, false).or_else(|| feed(PLAIN_FEED, true)),
         }
     }
 
-    pub fn lets_in(&self, admitted: &Admitted) -> bool {
+    /// True if a key of this tenant and role may connect.
+    pub fn accepts(&self, admitted: &Admitted) -> bool {
         match self {
-            Gate::Door => true,
-            Gate::Feed { tenant, plain } => {
+            ZapDomain::Requests => true,
+            ZapDomain::Feed { tenant, plain } => {
                 let roles = if *plain { rights::PLAIN } else { rights::SEALED };
                 admitted.tenant == *tenant && roles.contains(&admitted.role)
             }
@@ -65,33 +66,35 @@ impl Gate {
     }
 }
 
-/// ZAP's code of a refusal that may be over soon.
+/// The ZAP code of a refusal that may end soon.
 const CROWDED: &str = "300";
 
 const SEALED_FEED: &str = "apprentice/sealed/";
 const PLAIN_FEED: &str = "apprentice/plain/";
 
-/// More frames than this are not kept; ZeroMQ itself never sends so many.
+/// Frames of a question that are kept. ZeroMQ itself never sends so many.
 const FRAMES_READ_MAX: usize = 16;
 
-/// A secret of one service that turns a key into what ZeroMQ keeps as the `User-Id` of a connection.
-/// A client can send a `User-Id` of its own, which counts when nobody answered the handshake; it
-/// cannot guess this.
+/// A secret of one running service. With it, the answer to a handshake sets the `User-Id` of the
+/// connection. If no thread answers handshakes, ZeroMQ uses a `User-Id` that the client sends. The
+/// client does not know this secret, so such a `User-Id` is recognised.
 #[derive(Clone)]
-pub(super) struct Seal(String);
+pub(super) struct HandshakeSecret(String);
 
-impl Seal {
-    pub fn fresh() -> Seal {
+impl HandshakeSecret {
+    pub fn fresh() -> HandshakeSecret {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).expect("the operating system gives random bytes");
-        Seal(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+        HandshakeSecret(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
     fn stamp(&self, number: u64, key: &PublicKey) -> String {
         format!("{}:{number}:{key}", self.0)
     }
 
-    /// The number and the key of a connection whose handshake was answered here.
+    /// The number and the key of a connection, from its `User-Id`.
+    ///
+    /// - returns: none if this service did not set it.
     pub fn read(&self, user_id: &str) -> Option<(u64, PublicKey)> {
         let rest = user_id.strip_prefix(self.0.as_str())?.strip_prefix(':')?;
         let (number, key) = rest.split_once(':')?;
@@ -99,30 +102,30 @@ impl Seal {
     }
 }
 
-/// The thread that answers handshakes. Ends when dropped, which must come after the sockets that
-/// need it are closed.
+/// The thread that answers handshakes. It ends when this is dropped. Close the sockets that need it
+/// first.
 #[derive(Debug)]
 pub(super) struct Authenticator {
     bell: Outbox<()>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// What the thread owns. The guard comes first, so that the end is reported before the socket is
-/// closed: from then on handshakes fail open.
+/// What the thread owns. The guard is dropped first, so that the end is reported before the socket
+/// is closed. From then on ZeroMQ accepts every connection.
 struct Handshakes<W: Fn()> {
     guard: Guard<W>,
     socket: zmq::Socket,
     inbox: Inbox<()>,
-    seal: Seal,
+    secret: HandshakeSecret,
     admissions: Admissions,
     passes: Passes,
     counters: Arc<Counters>,
 }
 
-/// Reports the end of the thread, however it ends, unless it was told to end.
+/// Reports the end of the thread, also after a panic, unless the thread was told to end.
 struct Guard<W: Fn()> {
     failure: Failure,
-    /// Wakes whoever must see the failure.
+    /// Wakes the thread that must see the failure.
     wake: W,
     told: bool,
 }
@@ -137,13 +140,13 @@ impl<W: Fn()> Drop for Guard<W> {
 }
 
 impl Authenticator {
-    /// Must be there before the first socket that needs it listens.
+    /// Starts the thread. Call it before the first socket that needs it listens.
     ///
-    /// - `wake`: called when the thread ended without having been told to, after that was reported.
+    /// - `wake`: called after a failure of the thread was reported.
     /// - errors: why it did not start.
     pub fn start(
         context: &Context,
-        seal: Seal,
+        secret: HandshakeSecret,
         admissions: Admissions,
         passes: Passes,
         counters: Arc<Counters>,
@@ -157,11 +160,12 @@ impl Authenticator {
             .map_err(|error| format!("new connections cannot be authenticated: {error}"))?;
         let (bell, inbox) = Outbox::new().map_err(|error| error.to_string())?;
         let guard = Guard { failure: failure.clone(), wake, told: false };
-        let mut desk = Handshakes { guard, socket, inbox, seal, admissions, passes, counters };
+        let mut handshakes =
+            Handshakes { guard, socket, inbox, secret, admissions, passes, counters };
         let thread = thread::Builder::new()
             .name("authenticator".to_owned())
             .spawn(move || {
-                if let Err(error) = desk.serve() {
+                if let Err(error) = handshakes.serve() {
                     failure
                         .report(format!("new connections can no longer be authenticated: {error}"));
                 }
@@ -221,19 +225,19 @@ impl<W: Fn()> Handshakes<W> {
         Ok(frames)
     }
 
-    /// Version, request id, status code, status text, user id, metadata.
+    /// The frames of an answer: version, request id, status code, status text, user id, metadata.
     fn answer(&self, question: &[Vec<u8>]) -> [Vec<u8>; 6] {
         let (code, text, user_id) = match self.judge(question) {
             Ok((number, key)) => {
                 count(&self.counters.handshakes);
-                ("200", "", self.seal.stamp(number, &key))
+                ("200", "", self.secret.stamp(number, &key))
             }
             Err((code, text)) => {
                 match code {
                     CROWDED => count(&self.counters.handshakes_crowded),
                     _ => count(&self.counters.handshakes_denied),
                 }
-                // At debug level: a stranger must not be able to fill the operator's log.
+                // At debug level, because strangers must not be able to fill the operator's log.
                 tracing::debug!(code, text, "a connection was refused");
                 (code, text, String::new())
             }
@@ -243,10 +247,12 @@ impl<W: Fn()> Handshakes<W> {
         [b"1.0".to_vec(), id, code, text, user_id.into_bytes(), Vec::new()]
     }
 
-    /// A question has version, request id, domain, address, routing id, mechanism and key.
+    /// Decides about a question, whose frames are version, request id, domain, address, routing id,
+    /// mechanism and key.
     ///
-    /// - errors: the status code and text. Whether a key is unknown, retired or its lab closed is
-    ///   not told: a stranger must not learn which keys there are.
+    /// - returns: the number of the connection, and its key.
+    /// - errors: the status code and text. They are the same for an unknown key, a retired one and
+    ///   one of a disabled lab: a stranger must not learn which keys exist.
     fn judge(
         &self,
         question: &[Vec<u8>],
@@ -254,19 +260,19 @@ impl<W: Fn()> Handshakes<W> {
         let [version, _, domain, _, _, mechanism, key] = question else {
             return Err(("500", "not a question about a CURVE key"));
         };
-        let gate = Gate::read(domain);
-        let (b"1.0", Some(gate), b"CURVE") = (&version[..], gate, &mechanism[..]) else {
+        let domain = ZapDomain::read(domain);
+        let (b"1.0", Some(domain), b"CURVE") = (&version[..], domain, &mechanism[..]) else {
             return Err(("500", "not a question about a CURVE key"));
         };
         let denied = ("400", "not admitted");
         let key = PublicKey(key.as_slice().try_into().map_err(|_| denied)?);
         let admitted = self.admissions.admit(&key);
-        let admitted = admitted.filter(|admitted| gate.lets_in(admitted)).ok_or(denied)?;
-        let feed = gate != Gate::Door;
+        let admitted = admitted.filter(|admitted| domain.accepts(admitted)).ok_or(denied)?;
+        let feed = domain != ZapDomain::Requests;
         if feed && self.passes.is_cut_off(&key) {
             return Err(denied);
         }
-        // Tried again by ZeroMQ itself, as a connection that was denied is not.
+        // After this code the client's ZeroMQ tries again. After `denied` it does not.
         let number = self.passes.issue(feed, &admitted.tenant, &key);
         number.map(|number| (number, key)).ok_or((CROWDED, "too many connections"))
     }
@@ -278,13 +284,13 @@ mod tests {
     use crate::actors::wall_clock;
     use crate::tenancy::Role;
 
-    /// A authenticator, and a socket that asks it what ZeroMQ asks.
-    fn desk() -> (Authenticator, zmq::Socket, Failure) {
+    /// An authenticator, and a socket that asks it what ZeroMQ asks.
+    fn authenticator() -> (Authenticator, zmq::Socket, Failure) {
         let (context, failure) = (Context::new(), Failure::default());
         let (admissions, counters) = (Admissions::new(wall_clock()), Arc::default());
-        let keeper = Authenticator::start(
+        let authenticator = Authenticator::start(
             &context,
-            Seal::fresh(),
+            HandshakeSecret::fresh(),
             admissions,
             Passes::new(),
             counters,
@@ -293,12 +299,12 @@ mod tests {
         );
         let socket = context.socket(zmq::REQ).unwrap();
         socket.connect(ADDRESS).unwrap();
-        (keeper.unwrap(), socket, failure)
+        (authenticator.unwrap(), socket, failure)
     }
 
     #[test]
-    fn questions_that_are_none_are_answered_with_an_error_and_the_next_one_is_heard() {
-        let (keeper, socket, failure) = desk();
+    fn malformed_questions_are_answered_with_an_error_and_the_next_one_is_read() {
+        let (authenticator, socket, failure) = authenticator();
         let key = [7u8; 32];
         let question = |version: &'static [u8], domain: &'static [u8], key: &'static [u8]| {
             vec![version, b"1", domain, b"127.0.0.1", b"", b"CURVE", key]
@@ -317,16 +323,16 @@ mod tests {
             let answer = socket.recv_multipart(0).unwrap();
             assert_eq!(answer.len(), 6);
             assert_eq!(answer[2], code.as_bytes());
-            assert!(answer[4].is_empty(), "nobody is named who is not let in");
+            assert!(answer[4].is_empty(), "a refusal names no user");
         }
-        drop(keeper);
-        assert_eq!(failure.reason(), None, "an end that was asked for is no failure");
+        drop(authenticator);
+        assert_eq!(failure.reason(), None, "an end that was requested is no failure");
     }
 
     #[test]
-    fn whatever_frames_come_nobody_is_let_in_and_the_authenticator_stays() {
+    fn no_frames_are_accepted_or_end_the_authenticator() {
         use proptest::prelude::*;
-        let (keeper, socket, failure) = desk();
+        let (authenticator, socket, failure) = authenticator();
         let part = || {
             prop_oneof![
                 Just(b"1.0".to_vec()),
@@ -345,40 +351,40 @@ mod tests {
             prop_assert!(answer[2] == b"400" || answer[2] == b"500");
             prop_assert!(answer[4].is_empty());
         });
-        drop(keeper);
+        drop(authenticator);
         assert_eq!(failure.reason(), None);
     }
 
     #[test]
-    fn a_user_id_that_was_not_given_here_names_nobody() {
-        let (seal, other) = (Seal::fresh(), Seal::fresh());
+    fn a_user_id_that_another_service_set_is_not_read() {
+        let (secret, other) = (HandshakeSecret::fresh(), HandshakeSecret::fresh());
         let key = PublicKey([9; 32]);
-        assert_eq!(seal.read(&seal.stamp(3, &key)), Some((3, key)));
+        assert_eq!(secret.read(&secret.stamp(3, &key)), Some((3, key)));
         let forged = [other.stamp(3, &key), key.to_string(), format!(":3:{key}"), String::new()];
         for user_id in forged {
-            assert_eq!(seal.read(&user_id), None, "{user_id}");
+            assert_eq!(secret.read(&user_id), None, "{user_id}");
         }
     }
 
     #[test]
-    fn a_feed_lets_in_its_own_tenants_auditors_and_operators_and_the_plain_one_no_auditor() {
+    fn a_feed_accepts_auditors_and_operators_of_its_tenant_and_the_plain_one_no_auditor() {
         let [lab, other] = ["lab", "other"].map(|name| TenantId::new(name).unwrap());
-        let feed = |plain| Gate::Feed { tenant: lab.clone(), plain };
-        for gate in [Gate::Door, feed(false), feed(true)] {
-            assert_eq!(Gate::read(gate.domain().as_bytes()), Some(gate));
+        let feed = |plain| ZapDomain::Feed { tenant: lab.clone(), plain };
+        for domain in [ZapDomain::Requests, feed(false), feed(true)] {
+            assert_eq!(ZapDomain::read(domain.name().as_bytes()), Some(domain));
         }
         for domain in ["", "apprentice/", "apprentice/sealed/", "apprentice/plain/../x"] {
-            assert_eq!(Gate::read(domain.as_bytes()), None, "{domain}");
+            assert_eq!(ZapDomain::read(domain.as_bytes()), None, "{domain}");
         }
-        let lets_in = |gate: &Gate, tenant: &TenantId| {
+        let accepts = |domain: &ZapDomain, tenant: &TenantId| {
             [Role::Gateway, Role::Operator, Role::Auditor]
-                .map(|role| gate.lets_in(&Admitted { tenant: tenant.clone(), role }))
+                .map(|role| domain.accepts(&Admitted { tenant: tenant.clone(), role }))
         };
-        assert_eq!(lets_in(&feed(false), &lab), [false, true, true]);
-        assert_eq!(lets_in(&feed(true), &lab), [false, true, false]);
-        for gate in [feed(false), feed(true)] {
-            assert_eq!(lets_in(&gate, &other), [false; 3]);
-            assert_eq!(lets_in(&gate, &TenantId::local()), [false; 3]);
+        assert_eq!(accepts(&feed(false), &lab), [false, true, true]);
+        assert_eq!(accepts(&feed(true), &lab), [false, true, false]);
+        for domain in [feed(false), feed(true)] {
+            assert_eq!(accepts(&domain, &other), [false; 3]);
+            assert_eq!(accepts(&domain, &TenantId::local()), [false; 3]);
         }
     }
 }

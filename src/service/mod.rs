@@ -1,5 +1,5 @@
-//! The one place that wires a service together: store → actors → gateway. The binary starts it,
-//! and so does any program that wants the service inside itself (`examples/embed.rs`).
+//! Builds a service from its parts: store, actors, gateway. The program `apprentice` starts it.
+//! Your own program can start it inside its process (`examples/embed.rs`).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::actors::{
 use crate::client::{
     Client, ClientError, Context, CurveKey, CurveKeyError, Endpoint, EndpointError,
 };
-use crate::frontends::{Counts, Doors, FeedDoor, Gateway, GatewayError, LockedDoor};
+use crate::frontends::{Counts, Endpoints, FeedSettings, Gateway, GatewayError, KeyedEndpoints};
 use crate::ids::{PublicKey, TenantId, UserId};
 use crate::learning::Recipe;
 use crate::limits::{AWAKE_USERS_MAX, FEED_WAITING_MAX};
@@ -25,67 +25,78 @@ use crate::world::Domain;
 /// What a service is made of.
 #[derive(Debug, Clone)]
 pub struct Config<D: Domain> {
+    /// The world.
     pub domain: Arc<D>,
+    /// Where the records are kept.
     pub data: Data,
-    /// The recipe (TOML) that new people start with. People who are known keep theirs.
+    /// The recipe of new people, as TOML. Known people keep theirs.
     pub recipe_text: String,
-    /// Endpoints beside the one inside the process: `tcp://127.0.0.1:PORT` (0 takes a free port),
-    /// `tcp://[::1]:PORT`, `ipc://PATH`. Whoever reaches them is the single user of this machine:
-    /// tenant `local`, and its operator.
+    /// Endpoints without keys: `tcp://127.0.0.1:PORT` (0 takes a free port), `tcp://[::1]:PORT`,
+    /// `ipc://PATH`. Everybody who connects there is tenant `local` and its operator. The endpoint
+    /// inside the process always exists.
     pub listen: Vec<String>,
-    /// Endpoints where only those come in whose key was admitted; any address will do.
+    /// Endpoints that accept only admitted keys, at any address.
     pub listen_curve: Vec<String>,
-    /// Where what becomes durable is published: the first endpoint, after which the others follow.
-    /// Followers catch up at an endpoint of `listen_curve`, which must be there.
+    /// Where new records are published: the first endpoint of the feed; the others get the next
+    /// ports. Followers request missed records at an endpoint of `listen_curve`, so there must be
+    /// one.
     pub feed: Option<String>,
-    /// Messages of the feed that wait for one subscriber before it misses some.
+    /// Messages of the feed that may wait for one subscriber. It misses further ones.
     pub feed_waiting_max: i32,
-    /// The file of the service's own CURVE key, made when missing; none: `keys/server.curve` in the
-    /// data directory.
+    /// The file of the service's own CURVE key; it is made if there is none. None:
+    /// `keys/server.curve` in the data directory.
     pub server_key: Option<PathBuf>,
-    /// Trainings at once.
+    /// Trainings at the same time.
     pub trainers: usize,
-    /// People awake at once.
+    /// People awake at the same time.
     pub awake_max: usize,
     /// Faults on purpose, for drills; none in a normal service.
     pub faults: Option<FaultPlan>,
-    /// The machine's wall clock, unless a test sets another.
+    /// The wall clock of the machine, unless a test sets another.
     pub clock: Clock,
 }
 
 /// Where a service keeps what it records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Data {
+    /// In this data directory, which is made if there is none.
     Directory(PathBuf),
-    /// Nowhere: everything ends with the service. For tests and trials.
+    /// In memory: nothing is kept when the service stops. For tests and trials.
     Memory,
 }
 
 /// Why a service did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
+    /// An endpoint cannot be used.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
+    /// A feed needs an endpoint with keys.
     #[error(
         "a feed needs an endpoint with keys, where followers catch up; add one with \
          `--curve tcp://ADDRESS:PORT`"
     )]
     FeedAlone,
+    /// The service's own key cannot be read or made.
     #[error(transparent)]
     ServerKey(#[from] CurveKeyError),
+    /// The data directory cannot be opened.
     #[error(transparent)]
     Store(#[from] store::OpenError),
+    /// The faults on purpose cannot be prepared.
     #[error("the fault drill cannot be started: {0}")]
     Drill(std::io::Error),
+    /// The actors did not start.
     #[error(transparent)]
     Actors(#[from] ActorsError),
+    /// The gateway did not start.
     #[error(transparent)]
     Gateway(#[from] GatewayError),
 }
 
 /// A running service. Stops when dropped.
 pub struct Service {
-    // Dropped, and stopped, in this order: first nobody comes in, then everybody goes to sleep.
+    // Stopped and dropped in this order: no request may come in while people go to sleep.
     gateway: Gateway,
     actors: ActorSystem,
     context: Context,
@@ -93,16 +104,17 @@ pub struct Service {
     server_key: Option<PublicKey>,
 }
 
-/// Where a data directory keeps the service's own CURVE key. Not named `.key`: those are tenants'.
+/// The file in a data directory with the service's own CURVE key. Its ending is not `.key`, because
+/// those files are keys of tenants.
 pub fn server_key_file(directory: &Path) -> PathBuf {
     directory.join("keys/server.curve")
 }
 
-/// The endpoint inside the process; each service has a context, so that names do not meet.
+/// The endpoint inside the process. Each service has its own context, so the name may be the same.
 const INNER: &str = "inproc://apprentice";
 
 impl<D: Domain> Config<D> {
-    /// The `default` recipe, no endpoint, as many trainers and actor threads as fit this machine.
+    /// The recipe `default`, no endpoint outside the process, and one trainer for each processor.
     pub fn new(domain: Arc<D>, data: Data) -> Config<D> {
         let recipe = Recipe::builtin("default").expect("the recipe `default` ships");
         Config {
@@ -127,15 +139,17 @@ fn cores() -> usize {
 }
 
 impl Service {
-    /// Opens the store, trains the base mind, and opens the doors, in this order: nobody is
-    /// answered by a service that is not ready.
+    /// Opens the store, trains the base mind and then listens, so that no request meets a service
+    /// that is not ready. Blocks.
+    ///
+    /// - errors: what stood in the way. Nothing runs then.
     pub fn start<D: Domain>(config: Config<D>) -> Result<Service, StartError> {
         let open = config.listen.iter().map(|text| Endpoint::parse_open(text));
         let open: Vec<Endpoint> = open.collect::<Result<_, _>>()?;
-        let locked = config.listen_curve.iter().map(|text| Endpoint::parse(text));
-        let locked: Vec<Endpoint> = locked.collect::<Result<_, _>>()?;
+        let keyed = config.listen_curve.iter().map(|text| Endpoint::parse(text));
+        let keyed: Vec<Endpoint> = keyed.collect::<Result<_, _>>()?;
         let feed = config.feed.as_deref().map(Endpoint::parse).transpose()?;
-        if feed.is_some() && locked.is_empty() {
+        if feed.is_some() && keyed.is_empty() {
             return Err(StartError::FeedAlone);
         }
         let failure = Failure::default();
@@ -147,8 +161,8 @@ impl Service {
             Some(plan) => store.under(plan).map_err(StartError::Drill)?,
             None => store,
         };
-        // After the directory was locked: two processes must not make its key at once.
-        let key = match (locked.is_empty(), &config.server_key, &config.data) {
+        // After the directory was locked, so that two processes do not both make the key.
+        let key = match (keyed.is_empty(), &config.server_key, &config.data) {
             (true, _, _) => None,
             (false, Some(file), _) => Some(CurveKey::read_or_make(file)?),
             (false, None, Data::Directory(directory)) => {
@@ -170,22 +184,24 @@ impl Service {
         let waiting_max = config.feed_waiting_max;
         let feed = feed.as_ref().zip(actors.reader()).map(|(endpoint, reader)| {
             let notifications = actors.notifications().clone();
-            FeedDoor { endpoint, waiting_max, notifications, reader }
+            FeedSettings { endpoint, waiting_max, notifications, reader }
         });
-        let locked = key.as_ref().map(|key| LockedDoor { endpoints: &locked, key, feed });
-        let doors = Doors { inner: INNER, open: &open, locked };
+        let keyed = key.as_ref().map(|key| KeyedEndpoints { endpoints: &keyed, key, feed });
+        let endpoints = Endpoints { inner: INNER, open: &open, keyed };
         let (front, registrar) = (actors.front(), actors.registrar().clone());
-        let gateway = Gateway::open(&context, doors, front, registrar, failure.clone())?;
+        let gateway = Gateway::open(&context, endpoints, front, registrar, failure.clone())?;
         let server_key = key.map(|key| *key.public());
         Ok(Service { gateway, actors, context, failure, server_key })
     }
 
-    /// A client inside this process.
+    /// A client inside this process, as tenant `local`.
+    ///
+    /// - errors: those of ZeroMQ.
     pub fn connect(&self, user: UserId) -> Result<Client, ClientError> {
         Client::within(&self.context, INNER, user)
     }
 
-    /// The first endpoint without keys that other processes can reach, with the port that was taken.
+    /// The first endpoint without keys that other processes can reach, with its port.
     pub fn endpoint(&self) -> Option<&str> {
         self.endpoints().first().map(String::as_str)
     }
@@ -197,43 +213,43 @@ impl Service {
 
     /// The endpoints with keys.
     pub fn curve_endpoints(&self) -> &[String] {
-        self.gateway.locked_endpoints()
+        self.gateway.keyed_endpoints()
     }
 
-    /// The endpoints of the feed now, with their tenants and whether records are in the clear there.
+    /// The endpoints of the feed now, each with its tenant and whether its records are decrypted.
     pub fn feed_endpoints(&self) -> Vec<(TenantId, bool, String)> {
         self.gateway.feed_endpoints()
     }
 
-    /// Where orders about tenants are handed in from inside the process.
+    /// Takes orders about tenants from inside the process.
     pub fn registrar(&self) -> &Registrar {
         self.actors.registrar()
     }
 
-    /// The service's own public key, when it has a door with keys.
+    /// The service's own public key; none without an endpoint with keys.
     pub fn server_key(&self) -> Option<&PublicKey> {
         self.server_key.as_ref()
     }
 
-    /// Erases a person while the service runs: their key is destroyed, their minds and snapshots go,
-    /// and the tenant's stream says so, signed. Blocks.
+    /// Erases a person while the service runs: destroys their key, their minds and their snapshots,
+    /// and records it, signed, in the tenant's stream. Blocks.
     ///
-    /// - errors: nobody of that name, or what stood in the way.
+    /// - errors: no person has this name, or what stood in the way.
     pub fn erase(&self, tenant: TenantId, user: UserId) -> Erased {
         let (sender, receiver) = mpsc::channel();
         self.actors.erase(tenant, user, move |erased| {
-            // Nobody waits any more when the service was dropped meanwhile.
+            // This fails if the service was dropped meanwhile; then no caller waits.
             let _ = sender.send(erased);
         });
         receiver.recv().unwrap_or(Err(OrderError::Gone))
     }
 
-    /// What came through the doors.
+    /// What came through the endpoints since the start.
     pub fn counts(&self) -> Counts {
         self.gateway.counters().now()
     }
 
-    /// What each tenant takes, and how often it was turned away.
+    /// What each tenant uses, and how often it was refused.
     pub fn usage(&self) -> BTreeMap<TenantId, Usage> {
         self.actors.usage()
     }
@@ -243,18 +259,19 @@ impl Service {
         self.actors.awake()
     }
 
-    /// What waking people has cost, and how often a kept mind or snapshot was stale or damaged.
+    /// What waking people has cost since the start, and how often a kept mind or snapshot was stale
+    /// or damaged.
     pub fn wakings(&self) -> Wakings {
         self.actors.wakings()
     }
 
-    /// Why the service cannot go on, if so: it then answers nobody, and whoever started it must
-    /// end the process with a code that is not 0.
+    /// Why the service has failed; none if it has not. A failed service answers no request. End its
+    /// process with an exit code other than 0.
     pub fn failed(&self) -> Option<String> {
         self.failure.reason()
     }
 
-    /// Asks for the end of [`Service::wait`], from another thread or a signal handler.
+    /// A function that ends [`Service::wait`]. Call it from another thread or a signal handler.
     pub fn stopper(&self) -> impl Fn() + Send + Sync + use<> {
         let failure = self.failure.clone();
         move || failure.stop_expected()
@@ -269,10 +286,10 @@ impl Service {
         self.failed()
     }
 
-    /// Takes no more requests, answers those in hand, sends everybody to sleep and closes the
-    /// store. When this returns the data directory may be opened again.
+    /// Refuses new requests, answers those that were accepted, sends everybody to sleep and closes
+    /// the store. Afterwards the data directory can be opened again. Blocks.
     ///
-    /// - errors: the reason, when the service had failed before.
+    /// - errors: the reason, if the service had failed before.
     pub fn stop(mut self) -> Result<(), String> {
         let reason = self.failed();
         self.close();

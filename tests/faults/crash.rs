@@ -136,7 +136,7 @@ fn kill_once(place: &Place, moment: Moment, dice: &mut Dice) -> Vec<Insisted> {
         Moment::Learning => dice.below(4_000),
         _ => dice.below(150_000),
     } as u64);
-    let seeds: Vec<u64> = place.people.iter().map(|_| dice.next()).collect();
+    let seeds: Vec<u64> = place.people.iter().map(|_| dice.number()).collect();
     thread::scope(|scope| {
         let people: Vec<_> = place
             .people
@@ -179,7 +179,7 @@ fn settle(place: &Place, dice: &mut Dice) {
     let server = Server::start(&place.data(), &place.socket());
     let signals = Signals::default();
     for ledger in &place.people {
-        let insisted = Person::new(ledger, &place.socket(), dice.next(), &signals).insist();
+        let insisted = Person::new(ledger, &place.socket(), dice.number(), &signals).insist();
         insisted.expect("nobody hangs up");
     }
     server.kill();

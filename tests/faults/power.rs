@@ -168,7 +168,7 @@ fn one_disk(images: usize, syncs: Syncs, dice: &mut Dice, counts: &mut Counts) {
     let socket = folder.path().join("socket");
     let ledgers: Vec<Ledger> =
         (0..PEOPLE).map(|number| Ledger::new(&format!("person {number}"))).collect();
-    let seeds: Vec<u64> = ledgers.iter().map(|_| dice.next()).collect();
+    let seeds: Vec<u64> = ledgers.iter().map(|_| dice.number()).collect();
     let signals = Signals::default();
     let environment = match syncs {
         Syncs::Honest => Vec::new(),
@@ -258,7 +258,7 @@ fn look(
     let signals = Signals::default();
     thread::scope(|scope| {
         let people = then.iter().map(|ledger| {
-            let mut person = Person::new(ledger, &socket, dice.next(), &signals);
+            let mut person = Person::new(ledger, &socket, dice.number(), &signals);
             scope.spawn(move || {
                 let insisted = person.insist().expect("nobody hangs up");
                 person.step().expect("life goes on");

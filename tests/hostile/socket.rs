@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
-use apprentice::client::{Ask, Client, Command, DoorAsk, PersonAsk, Response, fresh_id};
+use apprentice::client::{Ask, Client, Command, PersonAsk, Response, ServiceAsk, fresh_id};
 use apprentice::ids::{RequestId, UserId};
 use apprentice::limits::FRAME_BYTES_MAX;
 use apprentice::service::{Data, Service};
@@ -53,7 +53,7 @@ impl Peer<'_> {
     fn settle(&self, counts: &mut Counts) {
         let id = fresh_id();
         let user = UserId::new("mallory").unwrap();
-        self.send(&[encode_request(&Request { id, user, ask: Ask::Door(DoorAsk::Hello) })]);
+        self.send(&[encode_request(&Request { id, user, ask: Ask::Service(ServiceAsk::Hello) })]);
         loop {
             let ready = self.socket.poll(zmq::POLLIN, 60_000).unwrap();
             assert_eq!(ready, 1, "no answer within a minute; {:?}", self.service.counts());

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use apprentice::client::wire::{self, Request};
 use apprentice::client::{
-    ArchiveAsk, Ask, Command, CurveKey, DoorAsk, Endpoint, FeedMessage, Frame, HeadView, Heads,
-    OnClash, Order, PersonAsk, PlainRecords, PlainView, Query, Response, SealedRecords, SealedView,
-    TenantAsk, TenantVerb, read_public,
+    ArchiveAsk, Ask, Command, CurveKey, Endpoint, FeedMessage, Frame, HeadView, Heads, OnClash,
+    Order, PersonAsk, PlainRecords, PlainView, Query, Response, SealedRecords, SealedView,
+    ServiceAsk, TenantAsk, TenantVerb, read_public,
 };
 use apprentice::events::{self, EventKind, Head, Header};
 use apprentice::evidence::{
@@ -107,8 +107,8 @@ pub fn requests() -> Vec<Vec<u8>> {
             Ask::Person(PersonAsk::Query(Query::Look)),
             Ask::Person(PersonAsk::Query(Query::Known)),
             Ask::Person(PersonAsk::Wait { seconds: 1 }),
-            Ask::Door(DoorAsk::Hello),
-            Ask::Door(DoorAsk::Feed),
+            Ask::Service(ServiceAsk::Hello),
+            Ask::Service(ServiceAsk::Feed),
             Ask::Archive(ArchiveAsk::Heads { after: Some(StreamKey([5; 16])), limit: 7 }),
             Ask::Archive(ArchiveAsk::Sealed {
                 stream: StreamKey([5; 16]),

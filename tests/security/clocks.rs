@@ -6,13 +6,13 @@ use std::process;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use apprentice::client::{Client, ClientError, CurveKey, ErrorCode, Identity, KeyView, Order};
-use apprentice::ids::{Seq, StreamId, TenantId, Timestamp, UserId};
+use apprentice::client::{Client, ClientError, CurveKey, ErrorCode, KeyView, Order};
+use apprentice::ids::{Seq, StreamId, TenantId, Timestamp};
 use apprentice::service::{Data, Service};
 use apprentice::store;
 use apprentice::tenancy::{Clock, Role};
 use apprentice::world::Stage;
-use apprentice_testkit::toy::config;
+use apprentice_testkit::lab::{self, tenant, user};
 
 /// Seconds since 1970, a day in 2026.
 const TODAY: u64 = 1_790_000_000;
@@ -20,35 +20,27 @@ const DAY: u64 = 24 * 60 * 60;
 const YEARS: u64 = 10 * 365 * DAY;
 
 /// A lab with a directory, and a clock that is set by hand.
-struct ActorSystem {
+struct Clocked {
     folder: tempfile::TempDir,
     wall: Arc<AtomicU64>,
     key: CurveKey,
     service: Option<Service>,
 }
 
-fn lab() -> TenantId {
-    TenantId::new("lab").unwrap()
-}
-
-fn user(name: &str) -> UserId {
-    UserId::new(name).unwrap()
-}
-
-impl ActorSystem {
+impl Clocked {
     /// With one gateway key, admitted at `seconds`.
-    fn new(seconds: u64) -> ActorSystem {
+    fn new(seconds: u64) -> Clocked {
         let (folder, key) = (tempfile::tempdir().unwrap(), CurveKey::new().unwrap());
         let wall = Arc::new(AtomicU64::new(seconds));
-        let mut actors = ActorSystem { folder, wall, key, service: None };
-        actors.start(seconds);
+        let mut clocked = Clocked { folder, wall, key, service: None };
+        clocked.start(seconds);
         let admit = Order::Admit {
-            key: *actors.key.public(),
+            key: *clocked.key.public(),
             role: Role::Gateway,
             label: "robot".to_owned(),
         };
-        assert_eq!((actors.order(Order::Add), actors.order(admit)), (1, 1));
-        actors
+        assert_eq!((clocked.order(Order::Add), clocked.order(admit)), (1, 1));
+        clocked
     }
 
     fn at(&self, seconds: u64) {
@@ -64,8 +56,7 @@ impl ActorSystem {
         self.stop();
         self.at(seconds);
         let wall = self.wall.clone();
-        let mut config = config(Data::Directory(self.directory()));
-        config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+        let mut config = lab::config(Data::Directory(self.directory()));
         config.clock = Clock::new(move || Timestamp(wall.load(Ordering::SeqCst) * 1_000_000));
         self.service = Some(Service::start(config).unwrap());
     }
@@ -87,7 +78,7 @@ impl ActorSystem {
 
     /// - returns: how many records it led to.
     fn order(&self, order: Order) -> u32 {
-        self.operator().order(Some(lab()), order).unwrap().recorded
+        self.operator().order(Some(tenant("lab")), order).unwrap().recorded
     }
 
     fn retire(&self, overlap_seconds: u64) -> u32 {
@@ -95,14 +86,12 @@ impl ActorSystem {
     }
 
     fn view(&self) -> KeyView {
-        self.operator().tenants(Some(lab())).unwrap()[0].keys[0].clone()
+        self.operator().tenants(Some(tenant("lab"))).unwrap()[0].keys[0].clone()
     }
 
     /// A new connection with the lab's key.
     fn connect(&self) -> Client {
-        let server = *self.service().server_key().unwrap();
-        let identity = Identity { key: self.key.clone(), server };
-        Client::connect_as(&self.service().curve_endpoints()[0], user("ada"), identity).unwrap()
+        lab::connect(self.service(), &self.key, "ada")
     }
 
     /// Neither an open connection nor a new one gets an answer.
@@ -123,91 +112,91 @@ impl ActorSystem {
 
 #[test]
 fn a_retired_key_stays_out_when_the_clock_is_set_back_before_and_after_a_restart() {
-    let mut actors = ActorSystem::new(TODAY);
-    let open = actors.connect();
+    let mut clocked = Clocked::new(TODAY);
+    let open = clocked.connect();
     open.hello().unwrap();
-    actors.at(TODAY + 5);
-    assert_eq!(actors.retire(0), 1);
-    actors.shut(&open);
-    actors.at(TODAY - DAY);
-    actors.shut(&open);
-    assert_eq!(actors.retire(0), 0);
+    clocked.at(TODAY + 5);
+    assert_eq!(clocked.retire(0), 1);
+    clocked.shut(&open);
+    clocked.at(TODAY - DAY);
+    clocked.shut(&open);
+    assert_eq!(clocked.retire(0), 0);
     for seconds in [TODAY - DAY, TODAY + 3, 0, TODAY + YEARS] {
-        actors.start(seconds);
-        actors.shut_to_new();
+        clocked.start(seconds);
+        clocked.shut_to_new();
     }
 }
 
 #[test]
 fn an_overlap_that_was_seen_to_end_stays_ended_and_a_later_record_tells_the_next_process() {
-    let mut actors = ActorSystem::new(TODAY);
-    let open = actors.connect();
-    assert_eq!(actors.retire(60), 1);
-    actors.at(TODAY + 59);
+    let mut clocked = Clocked::new(TODAY);
+    let open = clocked.connect();
+    assert_eq!(clocked.retire(60), 1);
+    clocked.at(TODAY + 59);
     open.hello().unwrap();
-    actors.connect().hello().unwrap();
-    assert!(!actors.view().retired);
-    actors.at(TODAY + 60);
-    actors.shut(&open);
-    actors.at(TODAY + 30);
-    actors.shut(&open);
+    clocked.connect().hello().unwrap();
+    assert!(!clocked.view().retired);
+    clocked.at(TODAY + 60);
+    clocked.shut(&open);
+    clocked.at(TODAY + 30);
+    clocked.shut(&open);
     // Something else is recorded after the end of the key.
-    actors.at(TODAY + 61);
-    actors.order(Order::Disable { reason: "a pause".to_owned() });
-    actors.order(Order::Enable);
-    actors.start(TODAY + 30);
-    actors.shut_to_new();
+    clocked.at(TODAY + 61);
+    clocked.order(Order::Disable { reason: "a pause".to_owned() });
+    clocked.order(Order::Enable);
+    clocked.start(TODAY + 30);
+    clocked.shut_to_new();
 }
 
 #[test]
 fn a_clock_set_back_before_an_overlap_began_ends_it() {
-    let mut actors = ActorSystem::new(TODAY);
-    let open = actors.connect();
+    let mut clocked = Clocked::new(TODAY);
+    let open = clocked.connect();
     open.hello().unwrap();
-    actors.retire(60);
-    actors.at(TODAY - 1);
-    actors.shut(&open);
+    clocked.retire(60);
+    clocked.at(TODAY - 1);
+    clocked.shut(&open);
     // Records have held times now. A record of the retired key says what the clock read.
-    assert_eq!(actors.order(Order::Disable { reason: "a pause".to_owned() }), 2);
-    actors.order(Order::Enable);
-    actors.start(TODAY + 30);
-    actors.shut_to_new();
+    assert_eq!(clocked.order(Order::Disable { reason: "a pause".to_owned() }), 2);
+    clocked.order(Order::Enable);
+    clocked.start(TODAY + 30);
+    clocked.shut_to_new();
 }
 
 #[test]
 fn a_clock_that_ran_ahead_once_keeps_no_key_and_its_overlaps_are_real_seconds() {
-    let actors = ActorSystem::new(TODAY + YEARS);
-    actors.at(TODAY);
-    let open = actors.connect();
+    let clocked = Clocked::new(TODAY + YEARS);
+    clocked.at(TODAY);
+    let open = clocked.connect();
     open.hello().unwrap();
-    assert_eq!(actors.retire(0), 1);
-    actors.shut(&open);
+    assert_eq!(clocked.retire(0), 1);
+    clocked.shut(&open);
 
-    let mut actors = ActorSystem::new(TODAY + YEARS);
-    actors.at(TODAY);
-    let open = actors.connect();
-    assert_eq!(actors.retire(60), 1);
-    actors.at(TODAY + 59);
+    let mut clocked = Clocked::new(TODAY + YEARS);
+    clocked.at(TODAY);
+    let open = clocked.connect();
+    assert_eq!(clocked.retire(60), 1);
+    clocked.at(TODAY + 59);
     open.hello().unwrap();
-    actors.at(TODAY + 60);
-    actors.shut(&open);
-    actors.start(TODAY + 60);
-    actors.shut_to_new();
+    clocked.at(TODAY + 60);
+    clocked.shut(&open);
+    clocked.start(TODAY + 60);
+    clocked.shut_to_new();
 }
 
 #[test]
 fn a_shorter_overlap_takes_effect_and_one_beyond_the_bound_is_refused() {
-    let actors = ActorSystem::new(TODAY);
-    let open = actors.connect();
-    let forever = Order::Retire { key: *actors.key.public(), overlap_seconds: u64::MAX };
-    let refused = actors.operator().order(Some(lab()), forever).unwrap_err().to_string();
+    let clocked = Clocked::new(TODAY);
+    let open = clocked.connect();
+    let forever = Order::Retire { key: *clocked.key.public(), overlap_seconds: u64::MAX };
+    let refused = clocked.operator().order(Some(tenant("lab")), forever).unwrap_err().to_string();
     assert!(refused.contains("at most 2592000 seconds (30 days)"), "{refused}");
-    assert_eq!(actors.retire(1_000), 1);
-    assert_eq!(actors.retire(2_000), 0);
+    assert_eq!(clocked.retire(1_000), 1);
+    assert_eq!(clocked.retire(2_000), 0);
     open.hello().unwrap();
-    assert_eq!(actors.retire(10), 1);
-    actors.at(TODAY + 10);
-    actors.shut(&open);
+    assert_eq!(clocked.retire(10), 1);
+    clocked.at(TODAY + 10);
+    clocked.shut(&open);
 }
 
 /// Runs a command that must succeed.
@@ -225,28 +214,28 @@ fn said(arguments: &[&str], data: &Path) -> String {
 #[test]
 fn the_log_shows_which_times_were_held() {
     const HELD: &str = "time held: the clock did not move forward";
-    let mut actors = ActorSystem::new(TODAY);
-    let ada = actors.service().connect(user("ada")).unwrap();
+    let mut clocked = Clocked::new(TODAY);
+    let ada = clocked.service().connect(user("ada")).unwrap();
     ada.start(Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }).unwrap();
-    actors.at(TODAY + 7);
+    clocked.at(TODAY + 7);
     ada.say("ring the brass bell").unwrap();
-    actors.at(TODAY - DAY);
+    clocked.at(TODAY - DAY);
     ada.say("ring the brass bell").unwrap();
-    actors.at(TODAY + 9);
+    clocked.at(TODAY + 9);
     ada.say("ring the brass bell").unwrap();
-    actors.stop();
+    clocked.stop();
 
-    let shown = said(&["log", "show", "--user", "ada"], &actors.directory());
+    let shown = said(&["log", "show", "--user", "ada"], &clocked.directory());
     let lines: Vec<&str> = shown.lines().collect();
     let said = (0..lines.len()).filter(|&at| lines[at].contains(" Interpreted "));
     let held: Vec<bool> = said.map(|at| lines[at + 1].trim() == HELD).collect();
     assert_eq!(held, [false, true, false], "{shown}");
 
     // Times never run backwards, also in a tenant's own stream.
-    let store = store::open(&actors.directory()).unwrap();
+    let store = store::open(&clocked.directory()).unwrap();
     for stream in [
         store.keys.stream_id(&TenantId::local(), &user("ada")).unwrap(),
-        StreamId::of_tenant(&lab()),
+        StreamId::of_tenant(&tenant("lab")),
     ] {
         let records = store.log.read(&stream, Seq::FIRST).unwrap();
         let records: Vec<_> = records.map(Result::unwrap).collect();

@@ -4,31 +4,23 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::process::{self, Stdio};
-use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
 use apprentice::client::{
-    Ask, Client, ClientError, Command, CurveKey, DoorAsk, ErrorCode, Identity, Order, Response,
+    Ask, Client, ClientError, Command, CurveKey, ErrorCode, Identity, Order, Response, ServiceAsk,
     TenantAsk, TenantVerb, fresh_id,
 };
-use apprentice::ids::{PublicKey, TenantId, UserId};
+use apprentice::ids::PublicKey;
 use apprentice::service::{Data, Service, StartError, server_key_file};
 use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::Stage;
-use apprentice_testkit::toy::config;
+use apprentice_testkit::lab::{self, FREE_PORT, admit, connect, identity, order, tenant, user};
+use apprentice_testkit::toy;
 
 /// A client must know within this time that it is not admitted.
 const BOUND: Duration = Duration::from_secs(20);
-
-fn user(name: &str) -> UserId {
-    UserId::new(name).unwrap()
-}
-
-fn tenant(name: &str) -> TenantId {
-    TenantId::new(name).unwrap()
-}
 
 fn task() -> Stage {
     Stage::Task { task: "Brass Glass".to_owned(), seed: 1 }
@@ -36,36 +28,9 @@ fn task() -> Stage {
 
 /// A service of bells with an endpoint without keys and one with keys.
 fn bells(data: Data) -> Service {
-    let mut config = config(data);
-    config.listen = vec!["tcp://127.0.0.1:0".to_owned()];
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+    let mut config = lab::config(data);
+    config.listen = vec![FREE_PORT.to_owned()];
     Service::start(config).unwrap()
-}
-
-/// Carries out orders and waits until they are durable.
-fn order(service: &Service, name: &str, order: Order) {
-    let (sender, receiver) = mpsc::channel();
-    service
-        .registrar()
-        .order(tenant(name), order.into(), move |obeyed| sender.send(obeyed).unwrap());
-    receiver.recv_timeout(BOUND).unwrap().unwrap();
-}
-
-fn admit(service: &Service, name: &str, role: Role) -> CurveKey {
-    let key = CurveKey::new().unwrap();
-    order(service, name, Order::Add);
-    let label = format!("{role} of {name}");
-    order(service, name, Order::Admit { key: *key.public(), role, label });
-    key
-}
-
-fn identity(service: &Service, key: &CurveKey) -> Identity {
-    Identity { key: key.clone(), server: *service.server_key().unwrap() }
-}
-
-fn connect(service: &Service, key: &CurveKey, name: &str) -> Client {
-    let endpoint = &service.curve_endpoints()[0];
-    Client::connect_as(endpoint, user(name), identity(service, key)).unwrap()
 }
 
 fn retire(key: &CurveKey) -> Order {
@@ -89,7 +54,7 @@ fn not_let_in(client: &Client) {
 }
 
 #[test]
-fn whoever_has_an_admitted_key_talks_and_teaches() {
+fn a_client_with_an_admitted_key_talks_and_teaches() {
     let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
     let ada = connect(&service, &key, "ada");
@@ -206,7 +171,7 @@ fn a_disabled_lab_is_shut_out_and_comes_back_as_it_was() {
 }
 
 #[test]
-fn whoever_knocks_at_the_wrong_door_or_at_a_wrong_service_is_told_so() {
+fn a_client_of_the_wrong_endpoint_or_the_wrong_service_is_told_so() {
     let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
     let locked = service.curve_endpoints()[0].clone();
@@ -237,31 +202,20 @@ fn connect_to(endpoint: &str, key: &CurveKey, server: PublicKey) -> Client {
     Client::connect_as(endpoint, user("ada"), Identity { key: key.clone(), server }).unwrap()
 }
 
-/// A socket with a key that can send anything.
-fn stranger(service: &Service, key: &CurveKey, folder: &tempfile::TempDir) -> zmq::Socket {
-    let path = folder.path().join(fresh_id().to_string());
-    key.write_new(&path).unwrap();
-    let text = fs::read_to_string(&path).unwrap();
-    let field = |name: &str| {
-        let line = text.lines().find_map(|line| line.trim().strip_prefix(name)).unwrap();
-        zmq::z85_decode(line.trim().trim_start_matches("= ").trim_matches('"')).unwrap()
-    };
-    let socket = zmq::Context::new().socket(zmq::DEALER).unwrap();
-    socket.set_linger(0).unwrap();
-    socket.set_curve_publickey(&field("public-key")).unwrap();
-    socket.set_curve_secretkey(&field("secret-key")).unwrap();
-    socket.set_curve_serverkey(&service.server_key().unwrap().0).unwrap();
-    socket
+/// A socket that can send anything.
+fn stranger(service: &Service, key: &CurveKey) -> zmq::Socket {
+    lab::socket(service, key, zmq::DEALER)
 }
 
 #[test]
 fn an_address_that_another_could_take_is_not_answered_to() {
-    let (service, folder) = (bells(Data::Memory), tempfile::tempdir().unwrap());
+    let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
-    let socket = stranger(&service, &key, &folder);
+    let socket = stranger(&service, &key);
     socket.set_identity(b"lab-a's robot").unwrap();
     socket.connect(&service.curve_endpoints()[0]).unwrap();
-    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Door(DoorAsk::Hello) };
+    let request =
+        Request { id: fresh_id(), user: user("ada"), ask: Ask::Service(ServiceAsk::Hello) };
     socket.send(encode_request(&request), 0).unwrap();
     assert_eq!(socket.poll(zmq::POLLIN, 30_000).unwrap(), 1, "an answer within 30 s");
     let (id, response) = decode_response(&socket.recv_bytes(0).unwrap()).unwrap();
@@ -272,29 +226,30 @@ fn an_address_that_another_could_take_is_not_answered_to() {
 
 #[test]
 fn a_thousand_denied_handshakes_leave_the_service_serving() {
-    const KNOCKS: u64 = 1_000;
-    let (service, folder) = (bells(Data::Memory), tempfile::tempdir().unwrap());
+    const HANDSHAKES: u64 = 1_000;
+    let service = bells(Data::Memory);
     let key = admit(&service, "lab-a", Role::Gateway);
     let ada = connect(&service, &key, "ada");
     ada.start(task()).unwrap();
     let unknown = CurveKey::new().unwrap();
-    let request = Request { id: fresh_id(), user: user("ada"), ask: Ask::Door(DoorAsk::Hello) };
+    let request =
+        Request { id: fresh_id(), user: user("ada"), ask: Ask::Service(ServiceAsk::Hello) };
     let bytes = encode_request(&request);
-    let mut knocked = 0;
-    while service.counts().handshakes_denied < KNOCKS {
-        let wanted = (service.counts().handshakes_denied + 20).min(KNOCKS);
+    let mut connected = 0;
+    while service.counts().handshakes_denied < HANDSHAKES {
+        let wanted = (service.counts().handshakes_denied + 20).min(HANDSHAKES);
         let sockets: Vec<zmq::Socket> = (0..20)
             .map(|_| {
-                let socket = stranger(&service, &unknown, &folder);
+                let socket = stranger(&service, &unknown);
                 socket.connect(&service.curve_endpoints()[0]).unwrap();
                 socket.send(&bytes, zmq::DONTWAIT).unwrap();
                 socket
             })
             .collect();
-        knocked += sockets.len();
+        connected += sockets.len();
         let end = Instant::now() + BOUND;
         while service.counts().handshakes_denied < wanted {
-            assert!(Instant::now() < end, "after {knocked}: {:?}", service.counts());
+            assert!(Instant::now() < end, "after {connected}: {:?}", service.counts());
             thread::sleep(Duration::from_millis(1));
         }
         // The endpoints serve admitted clients all the time.
@@ -303,7 +258,7 @@ fn a_thousand_denied_handshakes_leave_the_service_serving() {
     }
     connect(&service, &key, "bob").hello().unwrap();
     let counts = service.counts();
-    assert!(counts.handshakes_denied >= KNOCKS, "{counts:?}");
+    assert!(counts.handshakes_denied >= HANDSHAKES, "{counts:?}");
     assert_eq!((counts.unvouched, counts.denied, counts.dropped), (0, 0, 0), "{counts:?}");
     println!("{counts:?}");
     service.stop().unwrap();
@@ -311,12 +266,12 @@ fn a_thousand_denied_handshakes_leave_the_service_serving() {
 
 #[test]
 fn other_machines_are_listened_to_with_keys_alone() {
-    let mut open = config(Data::Memory);
+    let mut open = toy::config(Data::Memory);
     open.listen = vec!["tcp://0.0.0.0:0".to_owned()];
     let error = Service::start(open).err().expect("it must not start");
     assert!(matches!(error, StartError::Endpoint(_)), "{error}");
     assert!(error.to_string().contains("--curve"), "{error}");
-    let mut locked = config(Data::Memory);
+    let mut locked = toy::config(Data::Memory);
     locked.listen_curve = vec!["tcp://*:0".to_owned()];
     let service = Service::start(locked).unwrap();
     let port = service.curve_endpoints()[0].rsplit_once(':').unwrap().1.to_owned();
@@ -347,9 +302,7 @@ fn a_service_keeps_its_key_and_its_labs_over_a_restart() {
     service.stop().unwrap();
 
     fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
-    let mut config = config(data());
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
-    let error = Service::start(config).err().expect("others can read its key");
+    let error = Service::start(lab::config(data())).err().expect("others can read its key");
     assert!(error.to_string().contains("chmod 600"), "{error}");
 }
 
@@ -439,8 +392,7 @@ fn the_hosts_operator_makes_labs_over_the_wire_and_their_operators_keep_their_ke
     let verb = TenantVerb::Erase { user: user("ada") };
     let ask = Ask::Order(TenantAsk { tenant: None, verb });
     let request = Request { id: fresh_id(), user: user("operator of a"), ask };
-    let folder = tempfile::tempdir().unwrap();
-    let socket = stranger(&service, &a_key, &folder);
+    let socket = stranger(&service, &a_key);
     socket.connect(&service.curve_endpoints()[0]).unwrap();
     let erase = || {
         socket.send(encode_request(&request), 0).unwrap();
@@ -516,9 +468,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     assert!(code == 1 && text.contains("no tenant lab-z"), "{text}");
 
     // The service runs: the same commands, with the operator's key.
-    let mut config = config(Data::Directory(folder.path().join("data")));
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
-    let service = Service::start(config).unwrap();
+    let service = Service::start(lab::config(Data::Directory(folder.path().join("data")))).unwrap();
     let server = said(&["keys", "show", "--data", &data]);
     let endpoint = service.curve_endpoints()[0].clone();
     let (code, text) = complained(&closed.iter().map(|word| &**word).collect::<Vec<&str>>());
@@ -550,7 +500,7 @@ fn the_same_orders_are_given_to_a_closed_directory_and_to_a_running_service() {
     assert!(code == 1 && text.contains("the role operator; yours is gateway"), "{text}");
     let talk = ["talk", "--connect", &endpoint, "--key", &lab, "--server-key", server.trim()];
     let (code, text) = complained(&talk);
-    assert!(code == 1 && text.contains("does not let in your key"), "{text}");
+    assert!(code == 1 && text.contains("does not admit your key"), "{text}");
     service.stop().unwrap();
 
     // And stopped again: the orders had their effect.

@@ -10,16 +10,15 @@ use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
 use apprentice::client::{
-    ArchiveAsk, Ask, Client, CurveKey, DoorAsk, Follower, Identity, Order, PersonAsk, Query,
-    Response, fresh_id, read_public,
+    ArchiveAsk, Ask, Client, CurveKey, Follower, Identity, Order, PersonAsk, Query, Response,
+    ServiceAsk, fresh_id, read_public,
 };
-use apprentice::ids::{PublicKey, Seq, StreamKey, TenantId, UserId};
+use apprentice::ids::{PublicKey, Seq, StreamKey};
 use apprentice::limits::{KEY_CONNECTIONS_MAX, TOPICS_MAX};
 use apprentice::service::{Data, Service};
 use apprentice::tenancy::Role;
 use apprentice::world::Stage;
-
-use apprentice_testkit::toy;
+use apprentice_testkit::lab::{self, FREE_PORT, tenant, user};
 
 /// How long a test may take, hung or not.
 const BOUND: Duration = Duration::from_secs(60);
@@ -29,14 +28,6 @@ const DROPS: &str = "a tenant's connections do not read";
 const FLOOD: Duration = Duration::from_secs(5);
 /// Megabytes by which the process may grow in this time.
 const GROWTH_MAX: f64 = 64.0;
-
-fn lab(name: &str) -> TenantId {
-    TenantId::new(name).unwrap()
-}
-
-fn user(name: &str) -> UserId {
-    UserId::new(name).unwrap()
-}
 
 /// The program, serving from a directory of its own.
 struct Served {
@@ -53,8 +44,8 @@ impl Served {
         let dir = tempfile::tempdir().unwrap();
         let said = dir.path().join("said");
         let mut process = Process::new(env!("CARGO_BIN_EXE_apprentice"));
-        process.args(["serve", "--zmq", "tcp://127.0.0.1:0", "--curve", "tcp://127.0.0.1:0"]);
-        process.args(["--feed", "tcp://127.0.0.1:0", "--data"]).arg(dir.path().join("lab"));
+        process.args(["serve", "--zmq", FREE_PORT, "--curve", FREE_PORT]);
+        process.args(["--feed", FREE_PORT, "--data"]).arg(dir.path().join("lab"));
         process.env_remove("APPRENTICE_LOG").stdout(Stdio::piped());
         let mut child = process.stderr(File::create(&said).unwrap()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
@@ -75,7 +66,7 @@ impl Served {
             (Client::connect(&self.open, user("host")).unwrap(), CurveKey::new().unwrap());
         let admit = Order::Admit { key: *key.public(), role, label: String::new() };
         for order in [Order::Add, admit] {
-            host.order(Some(lab(name)), order).unwrap();
+            host.order(Some(tenant(name)), order).unwrap();
         }
         key
     }
@@ -208,7 +199,7 @@ fn eight_connections_that_take_no_answer_cost_bounded_memory_and_nobody_elses_ti
 }
 
 #[test]
-fn a_door_without_keys_is_bounded_in_the_same_way() {
+fn an_endpoint_without_keys_is_bounded_in_the_same_way() {
     let served = Served::start();
     let ada = Client::connect(&served.open, user("ada")).unwrap();
     ada.start(large_stage()).unwrap();
@@ -239,10 +230,10 @@ fn a_subscriber_that_asks_for_everything_is_cut_off_and_the_others_follow_on() {
     let ada = served.connect(&gateway, "ada");
     let mut follower = Follower::sealed(served.connect(&good, "good"), Default::default());
     ada.start(large_stage()).unwrap();
-    let door = served.connect(&bad, "bad");
+    let client = served.connect(&bad, "bad");
     let end = Instant::now() + BOUND;
     let feed = loop {
-        match door.feed().unwrap().sealed {
+        match client.feed().unwrap().sealed {
             Some(endpoint) => break endpoint,
             None => assert!(Instant::now() < end, "no feed within {BOUND:?}"),
         }
@@ -276,33 +267,23 @@ fn a_subscriber_that_asks_for_everything_is_cut_off_and_the_others_follow_on() {
     }
 }
 
-/// A service of bells with an endpoint for keys, and a gateway's key of a lab.
+/// A service of bells, and a gateway's key of a lab.
 fn bells() -> (Service, CurveKey) {
-    let mut config = toy::config(Data::Memory);
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
-    let (service, key) = (Service::start(config).unwrap(), CurveKey::new().unwrap());
-    let admit = Order::Admit { key: *key.public(), role: Role::Gateway, label: String::new() };
-    for order in [Order::Add, admit] {
-        let (sender, receiver) = std::sync::mpsc::channel();
-        service
-            .registrar()
-            .order(lab("lab"), order.into(), move |obeyed| sender.send(obeyed).unwrap());
-        receiver.recv_timeout(BOUND).unwrap().unwrap();
-    }
+    let service = Service::start(lab::config(Data::Memory)).unwrap();
+    let key = lab::admit(&service, "lab", Role::Gateway);
     (service, key)
 }
 
 #[test]
-fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
+fn a_key_has_so_many_connections_and_an_ended_one_makes_room() {
     let (service, key) = bells();
-    let context = zmq::Context::new();
-    let identity = Identity { key, server: *service.server_key().unwrap() };
+    let (context, identity) = (zmq::Context::new(), lab::identity(&service, &key));
     let connect = || {
         let socket = context.socket(zmq::DEALER).unwrap();
         socket.set_linger(0).unwrap();
         identity.put_on(&socket).unwrap();
         socket.connect(&service.curve_endpoints()[0]).unwrap();
-        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
+        socket.send(request("ada", Ask::Service(ServiceAsk::Hello)), 0).unwrap();
         socket
     };
     let is_answered = |socket: &zmq::Socket, patience: Duration| {
@@ -326,7 +307,7 @@ fn a_key_has_so_many_connections_and_who_leaves_makes_room() {
     sockets.truncate(KEY_CONNECTIONS_MAX - 1);
     assert!(is_answered(&one_more, BOUND), "there is room again");
     for socket in &sockets {
-        socket.send(request("ada", Ask::Door(DoorAsk::Hello)), 0).unwrap();
+        socket.send(request("ada", Ask::Service(ServiceAsk::Hello)), 0).unwrap();
         assert!(is_answered(socket, BOUND), "nobody else was cut off");
     }
 }

@@ -1,55 +1,27 @@
 //! The feed through real sockets: a follower gets every record of its lab, and no record of another
 //! lab.
 
-use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use apprentice::client::{
     BEAT, Client, ClientError, CurveKey, ErrorCode, FeedMessage, FollowError, Followed, Follower,
-    Identity,
 };
-use apprentice::ids::{Seq, TenantId, UserId, WithinTenant};
+use apprentice::ids::{Seq, WithinTenant};
 use apprentice::service::{Data, Service, StartError};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
-use apprentice_testkit::toy::config;
+use apprentice_testkit::lab::{self, FREE_PORT, admit, connect, order, tenant};
+use apprentice_testkit::toy;
 
 const BOUND: Duration = Duration::from_secs(60);
 /// A word that only this lab's people say.
 const CANARY: &str = "zyxquuxlab";
 
-fn tenant(name: &str) -> TenantId {
-    TenantId::new(name).unwrap()
-}
-
 fn service(waiting_max: i32) -> Service {
-    let mut config = config(Data::Memory);
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
-    config.feed = Some("tcp://127.0.0.1:0".to_owned());
+    let mut config = lab::config(Data::Memory);
+    config.feed = Some(FREE_PORT.to_owned());
     config.feed_waiting_max = waiting_max;
     Service::start(config).unwrap()
-}
-
-fn order(service: &Service, name: &str, order: Order) {
-    let (sender, receiver) = mpsc::channel();
-    service.registrar().order(tenant(name), order, move |obeyed| sender.send(obeyed).unwrap());
-    receiver.recv_timeout(BOUND).unwrap().unwrap();
-}
-
-fn admit(service: &Service, name: &str, role: Role) -> CurveKey {
-    let key = CurveKey::new().unwrap();
-    order(service, name, Order::Open);
-    order(service, name, Order::Admit { key: *key.public(), role, label: String::new() });
-    key
-}
-
-fn identity(service: &Service, key: &CurveKey) -> Identity {
-    Identity { key: key.clone(), server: *service.server_key().unwrap() }
-}
-
-fn connect(service: &Service, key: &CurveKey, user: &str) -> Client {
-    let endpoint = &service.curve_endpoints()[0];
-    Client::connect_as(endpoint, UserId::new(user).unwrap(), identity(service, key)).unwrap()
 }
 
 fn begin(client: &Client) {
@@ -76,10 +48,8 @@ fn endpoint(service: &Service, name: &str, plain: bool) -> String {
 
 /// A socket that reads every message.
 fn subscribe(service: &Service, key: &CurveKey, endpoint: &str) -> zmq::Socket {
-    let socket = zmq::Context::new().socket(zmq::SUB).unwrap();
-    socket.set_linger(0).unwrap();
+    let socket = lab::socket(service, key, zmq::SUB);
     socket.set_subscribe(b"").unwrap();
-    identity(service, key).put_on(&socket).unwrap();
     socket.connect(endpoint).unwrap();
     socket
 }
@@ -244,21 +214,21 @@ fn an_operator_follows_words_and_an_auditor_of_either_lab_sees_none_of_them() {
     }
 
     // At the service's endpoint as well.
-    let at_the_door = |key: &CurveKey, plain: bool| {
+    let from_the_service = |key: &CurveKey, plain: bool| {
         let client = connect(&service, key, "x");
         match plain {
             true => client.plain_records(stream, Seq::FIRST).map(|read| read.records.len()),
             false => client.records(stream, Seq::FIRST).map(|read| read.records.len()),
         }
     };
-    assert!(at_the_door(&auditor, false).unwrap() >= 10);
-    assert!(at_the_door(&operator, true).unwrap() >= 10);
+    assert!(from_the_service(&auditor, false).unwrap() >= 10);
+    assert!(from_the_service(&operator, true).unwrap() >= 10);
     for key in [&other_auditor, &other_operator] {
-        assert_eq!(at_the_door(key, false), Ok(0), "the same stream of another lab is empty");
+        assert_eq!(from_the_service(key, false), Ok(0), "the same stream of another lab is empty");
         assert!(!heads(&connect(&service, key, "x")).contains_key(&stream));
     }
     for (key, plain) in [(&auditor, true), (&gateway, false), (&gateway, true)] {
-        let denied = at_the_door(key, plain).unwrap_err();
+        let denied = from_the_service(key, plain).unwrap_err();
         assert!(matches!(denied, ClientError::Failed { code: ErrorCode::Denied, .. }), "{denied}");
     }
     assert_eq!(connect(&service, &auditor, "x").feed().unwrap().plain, None);
@@ -309,9 +279,9 @@ fn a_key_that_is_taken_back_hears_nothing_more_and_the_others_go_on() {
 }
 
 #[test]
-fn a_feed_without_a_door_with_keys_is_refused() {
-    let mut config = config(Data::Memory);
-    config.feed = Some("tcp://127.0.0.1:0".to_owned());
+fn a_feed_without_an_endpoint_with_keys_is_refused() {
+    let mut config = toy::config(Data::Memory);
+    config.feed = Some(FREE_PORT.to_owned());
     match Service::start(config) {
         Err(error @ StartError::FeedAlone) => assert!(error.to_string().contains("--curve")),
         other => panic!("{:?}", other.map(|_| ())),

@@ -3,10 +3,11 @@
 
 mod actors;
 mod conversation;
-mod embed;
+mod examples;
 mod feed;
 mod protocol;
 mod quotas;
 mod recorded_through_socket;
+mod refused_messages;
 mod request_ids;
 mod wire;

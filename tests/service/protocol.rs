@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use apprentice::client::wire::{Request, decode_response, encode_request};
 use apprentice::client::{
-    Ask, Client, ClientError, Command, DoorAsk, ErrorCode, OnClash, PersonAsk, Phase,
-    RejectionCode, Reply, Response, Told, fresh_id,
+    Ask, Client, ClientError, Command, ErrorCode, OnClash, PersonAsk, Phase, RejectionCode, Reply,
+    Response, ServiceAsk, Told, fresh_id,
 };
 use apprentice::ids::{RequestId, UserId};
 use apprentice::language::Outcome;
@@ -77,7 +77,7 @@ impl Stranger {
     /// is repeated until a new connection carries it.
     fn is_heard_again(&self) {
         let answered = (0..60).any(|_| {
-            self.ask(fresh_id(), Ask::Door(DoorAsk::Hello));
+            self.ask(fresh_id(), Ask::Service(ServiceAsk::Hello));
             self.socket.poll(zmq::POLLIN, 500).unwrap() == 1
         });
         assert!(answered, "an answer within 30 s");
@@ -86,7 +86,7 @@ impl Stranger {
     /// The next answer is to this question: the messages before it got no answer.
     fn nothing_before(&self) {
         let id = fresh_id();
-        self.ask(id, Ask::Door(DoorAsk::Hello));
+        self.ask(id, Ask::Service(ServiceAsk::Hello));
         let (found, response) = self.answer();
         assert_eq!(found, id);
         assert!(matches!(response, Response::Hello(_)));
@@ -142,7 +142,7 @@ fn malformed_messages_are_dropped_and_counted_and_the_next_one_is_answered() {
     let fine = encode_request(&Request {
         id: fresh_id(),
         user: user("m"),
-        ask: Ask::Door(DoorAsk::Hello),
+        ask: Ask::Service(ServiceAsk::Hello),
     });
     let many: Vec<&[u8]> = vec![&fine; 1_000];
     for frames in [&[&b""[..]][..], &[&b"\xff\xfe\x00"[..]], &[&fine, &fine], &many] {

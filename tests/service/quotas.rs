@@ -5,11 +5,11 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use apprentice::actors::{
-    ActorSettings, ActorSystem, AnswerTo, Failure, Front, Refusals, Registrar, wall_clock,
+    ActorSettings, ActorSystem, AnswerTo, Failure, Front, Refusals, wall_clock,
 };
 use apprentice::client::{
-    Ask, Client, ClientError, Command, CurveKey, DoorAsk, Identity, OnClash, Order, PersonAsk,
-    Phase, Query, Quota, Response, fresh_id,
+    Ask, Client, ClientError, Command, CurveKey, OnClash, Order, PersonAsk, Phase, Query, Quota,
+    Response, ServiceAsk, fresh_id,
 };
 use apprentice::ids::{RequestId, Seq, TenantId, UserId};
 use apprentice::learning::Recipe;
@@ -19,7 +19,8 @@ use apprentice::store::{self, Store};
 use apprentice::tenancy::{Quotas, Role};
 use apprentice::world::Stage;
 use apprentice_testkit::front::hand_in;
-use apprentice_testkit::toy::{self, Bells, Gate};
+use apprentice_testkit::lab::{self, obey, tenant};
+use apprentice_testkit::toy::{Bells, Gate};
 
 const LONG: Duration = Duration::from_secs(30);
 
@@ -38,18 +39,8 @@ fn actors(store: Store, gate: Option<&Arc<Gate>>) -> ActorSystem {
     .unwrap()
 }
 
-fn lab(name: &str) -> TenantId {
-    TenantId::new(name).unwrap()
-}
-
 fn user(number: usize) -> UserId {
     UserId::new(&format!("person {number}")).unwrap()
-}
-
-fn obey(registrar: &Registrar, tenant: &TenantId, order: Order) {
-    let (sender, receiver) = mpsc::channel();
-    registrar.order(tenant.clone(), order.into(), move |obeyed| sender.send(obeyed).unwrap());
-    receiver.recv_timeout(Duration::from_secs(60)).expect("an answer").expect("it is obeyed");
 }
 
 /// Labs with these quotas.
@@ -62,9 +53,7 @@ fn allow(actors: &ActorSystem, labs: &[(&TenantId, Quotas)]) {
 
 /// A service with an endpoint for keys, and labs with these quotas.
 fn service(data: Data, labs: &[(&TenantId, Quotas)]) -> Service {
-    let mut config = toy::config(data);
-    config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
-    let service = Service::start(config).unwrap();
+    let service = Service::start(lab::config(data)).unwrap();
     for (tenant, quotas) in labs {
         obey(service.registrar(), tenant, Order::Add);
         obey(service.registrar(), tenant, Order::SetQuotas(*quotas));
@@ -74,16 +63,11 @@ fn service(data: Data, labs: &[(&TenantId, Quotas)]) -> Service {
 
 /// A key of a lab's gateway.
 fn admit(service: &Service, tenant: &TenantId) -> CurveKey {
-    let (key, label) = (CurveKey::new().unwrap(), "a test".to_owned());
-    let admit = Order::Admit { key: *key.public(), role: Role::Gateway, label };
-    obey(service.registrar(), tenant, admit);
-    key
+    lab::admit(service, tenant.as_str(), Role::Gateway)
 }
 
 fn connect(service: &Service, key: &CurveKey, number: usize, patience: Duration) -> Client {
-    let identity = Identity { key: key.clone(), server: *service.server_key().unwrap() };
-    let client = Client::connect_as(&service.curve_endpoints()[0], user(number), identity);
-    client.unwrap().with_patience(patience)
+    lab::connect(service, key, user(number).as_str()).with_patience(patience)
 }
 
 /// Asks once, without a socket.
@@ -127,7 +111,7 @@ fn teach(told: impl Fn(Command) -> Seq) {
 
 #[test]
 fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
-    let (flood, quiet) = (lab("flood"), lab("quiet"));
+    let (flood, quiet) = (tenant("flood"), tenant("quiet"));
     let quotas = Quotas { utterances_per_second: Some(5), burst: Some(10), ..Quotas::default() };
     let service = service(Data::Memory, &[(&flood, quotas), (&quiet, Quotas::default())]);
     let [loud_key, quiet_key] = [&flood, &quiet].map(|tenant| admit(&service, tenant));
@@ -172,7 +156,7 @@ fn a_lab_over_its_rate_hears_the_numbers_and_the_other_is_answered() {
 fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
     let (gate, store) = (Arc::<Gate>::default(), store::open_memory());
     let actors = actors(store, Some(&gate));
-    let (full, other) = (lab("full"), lab("other"));
+    let (full, other) = (tenant("full"), tenant("other"));
     let quotas = Quotas { awake_users: Some(2), ..Quotas::default() };
     allow(&actors, &[(&full, quotas), (&other, Quotas::default())]);
     let front = actors.front();
@@ -232,7 +216,7 @@ fn a_lab_at_its_awake_bound_puts_its_own_people_to_sleep_and_nobody_elses() {
 fn requests_in_flight_are_bounded_for_each_lab() {
     let gate = Arc::<Gate>::default();
     let actors = actors(store::open_memory(), Some(&gate));
-    let (full, other) = (lab("full"), lab("other"));
+    let (full, other) = (tenant("full"), tenant("other"));
     let quotas = Quotas { in_flight: Some(3), ..Quotas::default() };
     allow(&actors, &[(&full, quotas), (&other, Quotas::default())]);
     let front = actors.front();
@@ -246,7 +230,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
     for _ in 0..3 {
         send(&front, &full, 0, fresh_id(), Ask::Person(PersonAsk::Wait { seconds: 30 }), &sender);
     }
-    match ask(&front, &full, 1, fresh_id(), Ask::Door(DoorAsk::Hello)) {
+    match ask(&front, &full, 1, fresh_id(), Ask::Service(ServiceAsk::Hello)) {
         Response::QuotaExceeded(over) => {
             assert_eq!((over.quota, over.used, over.limit), (Quota::InFlight, 3, 3));
         }
@@ -260,7 +244,7 @@ fn requests_in_flight_are_bounded_for_each_lab() {
         assert!(matches!(waited, Response::Waited(_)), "{waited:?}");
     }
     assert!(matches!(
-        ask(&front, &full, 1, fresh_id(), Ask::Door(DoorAsk::Hello)),
+        ask(&front, &full, 1, fresh_id(), Ask::Service(ServiceAsk::Hello)),
         Response::Hello(_)
     ));
 }
@@ -287,7 +271,7 @@ fn fill(client: &Client) -> usize {
 fn bytes_in_the_log_are_counted_over_a_restart_and_can_be_allowed_again() {
     let dir = tempfile::tempdir().unwrap();
     let data = Data::Directory(dir.path().to_owned());
-    let (full, other) = (lab("full"), lab("other"));
+    let (full, other) = (tenant("full"), tenant("other"));
     let limited = |bytes| Quotas { sealed_bytes: Some(bytes), ..Quotas::default() };
     let first = service(data.clone(), &[(&full, limited(40_000)), (&other, Quotas::default())]);
     let [full_key, other_key] = [&full, &other].map(|tenant| admit(&first, tenant));
@@ -319,7 +303,7 @@ fn holdings(store: &Store, tenant: &TenantId) -> (u64, usize) {
 fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
     let store = store::open_memory();
     let actors = actors(store.clone(), None);
-    let lab = lab("lab");
+    let lab = tenant("lab");
     allow(&actors, &[(&lab, Quotas::default())]);
     let (front, before) = (actors.front(), holdings(&store, &lab));
     let wait = Ask::Person(PersonAsk::Wait { seconds: 1 });
@@ -386,7 +370,7 @@ fn a_question_makes_nobody_and_what_is_declined_does_not_either() {
 fn a_full_lab_closes_erases_and_takes_keys_back_and_writes_nothing_else() {
     let dir = tempfile::tempdir().unwrap();
     let data = Data::Directory(dir.path().to_owned());
-    let full = lab("full");
+    let full = tenant("full");
     let quotas = Quotas { sealed_bytes: Some(40_000), ..Quotas::default() };
     let service = service(data, &[(&full, quotas)]);
     let gateway = admit(&service, &full);

@@ -83,7 +83,7 @@ impl Person {
             Phase::Teaching => teaching(dice, session),
         };
         let mut request = [0; 16];
-        request[..8].copy_from_slice(&dice.next().to_be_bytes());
+        request[..8].copy_from_slice(&dice.number().to_be_bytes());
         let request = RequestId(request);
         self.asked.push(Asked { request, command, heard: Heard::Nothing });
     }

@@ -461,7 +461,7 @@ impl System {
 
     pub fn fresh_request(&mut self) -> RequestId {
         let mut request = [0xff; 16];
-        request[..8].copy_from_slice(&self.dice.next().to_be_bytes());
+        request[..8].copy_from_slice(&self.dice.number().to_be_bytes());
         RequestId(request)
     }
 

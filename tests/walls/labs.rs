@@ -2,28 +2,23 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::mpsc;
 use std::time::Duration;
 
 use apprentice::client::{
-    ArchiveAsk, Ask, Client, Command, CurveKey, DoorAsk, Identity, OnClash, Response, Status, wire,
+    ArchiveAsk, Ask, Client, Command, CurveKey, OnClash, Response, ServiceAsk, Status, wire,
 };
 use apprentice::frontends::Counts;
-use apprentice::ids::{PublicKey, RequestId, StreamId, StreamKey, TenantId, UserId};
+use apprentice::ids::{PublicKey, RequestId, StreamId, StreamKey, TenantId};
 use apprentice::learning::Recipe;
 use apprentice::service::{self, Config, Data};
 use apprentice::tenancy::{Order, Role};
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use apprentice_testkit::lab::{self, FREE_PORT};
 
 const BOUND: Duration = Duration::from_secs(60);
 
 pub struct Service(service::Service);
-
-/// A key as ZeroMQ makes it, and a client that uses it.
-pub struct Key {
-    pair: zmq::CurveKeyPair,
-}
 
 pub struct Lab {
     pub name: String,
@@ -32,7 +27,7 @@ pub struct Lab {
     /// The request in which that person said this lab's words.
     pub said: RequestId,
     canary: String,
-    keys: BTreeMap<&'static str, Key>,
+    keys: BTreeMap<&'static str, CurveKey>,
     /// The stream of one of its people, when they have talked.
     person: StreamKey,
     client: Client,
@@ -45,27 +40,14 @@ impl Service {
         let mut config =
             Config::new(std::sync::Arc::new(Household::new()), Data::Directory(dir.to_owned()));
         config.recipe_text = Recipe::builtin("default").unwrap().to_owned();
-        config.listen_curve = vec!["tcp://127.0.0.1:0".to_owned()];
+        config.listen_curve = vec![FREE_PORT.to_owned()];
         Service(service::Service::start(config).unwrap())
     }
 
-    fn order(&self, name: &str, order: Order) {
-        let (sender, receiver) = mpsc::channel();
-        let tenant = TenantId::new(name).unwrap();
-        let answer = move |obeyed| sender.send(obeyed).unwrap();
-        self.0.registrar().order(tenant, order, answer);
-        receiver.recv_timeout(BOUND).unwrap().unwrap();
-    }
-
     /// A socket that sends any bytes.
-    pub fn wire(&self, key: &Key) -> Wire {
-        let context = zmq::Context::new();
-        let socket = context.socket(zmq::DEALER).unwrap();
-        socket.set_linger(0).unwrap();
+    pub fn wire(&self, key: &CurveKey) -> Wire {
+        let socket = lab::socket(&self.0, key, zmq::DEALER);
         socket.set_rcvtimeo(BOUND.as_millis() as i32).unwrap();
-        socket.set_curve_serverkey(&self.0.server_key().unwrap().0).unwrap();
-        socket.set_curve_publickey(&key.pair.public_key).unwrap();
-        socket.set_curve_secretkey(&key.pair.secret_key).unwrap();
         socket.connect(&self.0.curve_endpoints()[0]).unwrap();
         Wire { socket, waiting: BTreeMap::new() }
     }
@@ -73,11 +55,11 @@ impl Service {
     /// Retires a key while its connection is open.
     pub fn make_stale(&self, lab: &Lab, key: &str, wire: &mut Wire) {
         let id = RequestId([0x77; 16]);
-        let (user, ask) = (UserId::new("ada").unwrap(), Ask::Door(DoorAsk::Hello));
+        let (user, ask) = (lab::user("ada"), Ask::Service(ServiceAsk::Hello));
         wire.send(&[wire::encode_request(&wire::Request { id, user, ask })]);
         wire.reply_to(id);
         let key = lab.public(key);
-        self.order(&lab.name, Order::Retire { key, overlap_seconds: 0 });
+        lab::order(&self.0, &lab.name, Order::Retire { key, overlap_seconds: 0 });
     }
 
     pub fn counts(&self) -> Counts {
@@ -118,31 +100,21 @@ impl Lab {
     /// Opens the tenant and admits a key for each role, and one that will be retired.
     pub fn found(service: &Service, name: &str) -> Lab {
         let canary = format!("zyx{name}quux");
-        service.order(name, Order::Open);
-        let mut keys = BTreeMap::new();
-        for (label, role) in [
-            ("gateway", Role::Gateway),
-            ("operator", Role::Operator),
-            ("auditor", Role::Auditor),
-            ("stale", Role::Operator),
-        ] {
-            let pair = zmq::CurveKeyPair::new().unwrap();
-            let key = PublicKey(pair.public_key);
-            service.order(name, Order::Admit { key, role, label: canary.clone() });
-            keys.insert(label, Key { pair });
-        }
-        let file = tempfile::tempdir().unwrap();
-        let path = file.path().join("gateway");
-        let own = CurveKey::read_or_make(&path).unwrap();
-        let label = canary.clone();
-        service.order(name, Order::Admit { key: *own.public(), role: Role::Gateway, label });
-        let connect = |user: &str| {
-            let server = *service.0.server_key().unwrap();
-            let identity = Identity { key: own.clone(), server };
-            let user = UserId::new(user).unwrap();
-            Client::connect_as(&service.0.curve_endpoints()[0], user, identity).unwrap()
+        lab::order(&service.0, name, Order::Open);
+        let admit = |role| {
+            let (key, label) = (CurveKey::new().unwrap(), canary.clone());
+            lab::order(&service.0, name, Order::Admit { key: *key.public(), role, label });
+            key
         };
-        let (client, hidden) = (connect("ada"), connect(&canary));
+        let keys = BTreeMap::from([
+            ("gateway", admit(Role::Gateway)),
+            ("operator", admit(Role::Operator)),
+            ("auditor", admit(Role::Auditor)),
+            ("stale", admit(Role::Operator)),
+        ]);
+        let own = admit(Role::Gateway);
+        let [client, hidden] =
+            ["ada", &canary].map(|person| lab::connect(&service.0, &own, person));
         let said = RequestId([name.len() as u8; 16]);
         Lab {
             name: name.to_owned(),
@@ -172,7 +144,7 @@ impl Lab {
         }
         let id = RequestId([0x78; 16]);
         let (user, ask) = (
-            UserId::new("auditor").unwrap(),
+            lab::user("auditor"),
             Ask::Archive(ArchiveAsk::Heads { after: Some(StreamKey::TENANT), limit: 10 }),
         );
         let mut wire = service.wire(&self.keys["auditor"]);
@@ -198,15 +170,15 @@ impl Lab {
     }
 
     pub fn tenant(&self) -> TenantId {
-        TenantId::new(&self.name).unwrap()
+        lab::tenant(&self.name)
     }
 
-    pub fn keys(&self) -> impl Iterator<Item = (&'static str, &Key)> {
+    pub fn keys(&self) -> impl Iterator<Item = (&'static str, &CurveKey)> {
         self.keys.iter().map(|(name, key)| (*name, key))
     }
 
     pub fn public(&self, key: &str) -> PublicKey {
-        PublicKey(self.keys[key].pair.public_key)
+        *self.keys[key].public()
     }
 
     /// The stream of one of its people.

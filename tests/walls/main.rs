@@ -90,7 +90,7 @@ fn exported(dir: &std::path::Path, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_store_gives_one_tenants_streams_to_nobody_who_asks_as_another() {
+fn a_store_gives_no_tenant_the_streams_of_another() {
     let store = store::open_memory();
     let [a, b] = ["atoll", "borough"].map(|name| TenantId::new(name).unwrap());
     let user = apprentice::ids::UserId::new("ada").unwrap();

@@ -9,42 +9,59 @@ use apprentice_core::world::{Stage, View};
 
 use crate::probe::{Probe, probe};
 use crate::protocol::{
-    ArchiveAsk, Ask, Command, DoorAsk, ErasedView, ErrorCode, FeedView, HeadView, Heads, Hello,
+    ArchiveAsk, Ask, Command, ErasedView, ErrorCode, FeedView, HeadView, Heads, Hello,
     KnownExemplar, OnClash, Order, Ordered, PersonAsk, Phase, PlainRecords, Query, Quota,
-    QuotaExceeded, RejectionCode, Reply, Response, SealedRecords, Status, TenantAsk, TenantVerb,
-    TenantView, Waited,
+    QuotaExceeded, RejectionCode, Reply, Response, SealedRecords, ServiceAsk, Status, TenantAsk,
+    TenantVerb, TenantView, Waited,
 };
 use crate::wire::{self, Request};
 use crate::{Context, CurveKey, Endpoint, EndpointError, z85};
 
-/// One person's end of the wire: asks, waits, and asks again with the same request id, which is
-/// always safe.
+/// Sends one person's requests to a service and waits for the answers. If an answer is late, it
+/// sends the request again with the same request id. This is always safe: the service carries out a
+/// request id once.
+///
+/// ```no_run
+/// use apprentice_client::Client;
+/// use apprentice_core::ids::UserId;
+/// use apprentice_core::world::Stage;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // `apprentice serve --zmq tcp://127.0.0.1:7117` runs on this machine.
+/// let client = Client::connect("tcp://127.0.0.1:7117", UserId::new("ada")?)?;
+/// client.start(Stage::Task { task: "clean Mug CounterTop".to_owned(), seed: 7 })?;
+/// let reply = client.say("go to the mug")?;
+/// println!("{:?}", reply.told);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Client {
     socket: zmq::Socket,
     user: UserId,
     endpoint: String,
     identity: Option<Identity>,
     patience: Duration,
-    state: Cell<Line>,
+    connection: Cell<Connection>,
 }
 
-/// Who a client is where keys are asked for, and whom it takes for the service.
+/// What a client needs at an endpoint with keys.
 #[derive(Debug, Clone)]
 pub struct Identity {
+    /// The client's own key.
     pub key: CurveKey,
-    /// The service's public key; whoever has another one is not talked to.
+    /// The public key of the service. The client talks to no other service.
     pub server: PublicKey,
 }
 
 /// What is known of a client's connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Line {
-    /// Nothing was heard on it yet.
+enum Connection {
+    /// No answer came through it yet.
     Fresh,
     /// An answer came through it.
-    Heard,
-    /// It was not let in, after which ZeroMQ does not try again by itself.
-    Closed,
+    Used,
+    /// The service refused it. ZeroMQ does not connect again by itself.
+    Refused,
 }
 
 /// Why there is no answer.
@@ -52,53 +69,126 @@ enum Line {
 pub enum ClientError {
     /// Normal: the service declined, and recorded nothing.
     #[error("{message}")]
-    Rejected { code: RejectionCode, message: String },
+    Rejected {
+        /// For programs.
+        code: RejectionCode,
+        /// For people: one sentence.
+        message: String,
+    },
+    /// The service cannot answer this request.
     #[error("{message}")]
-    Failed { code: ErrorCode, message: String },
-    /// Whether the request was carried out is not known; asking again with the same id will tell.
+    Failed {
+        /// For programs.
+        code: ErrorCode,
+        /// For people: one sentence.
+        message: String,
+    },
+    /// It is not known whether the request was carried out. Ask again with the same request id
+    /// ([`Client::command_again`]).
     #[error("no answer from {endpoint} within {seconds} s; is the service running?")]
-    NoAnswer { endpoint: String, seconds: u64 },
+    NoAnswer {
+        /// Where the service was expected.
+        endpoint: String,
+        /// How long the client waited.
+        seconds: u64,
+    },
+    /// The service does not admit the client's key.
     #[error(
-        "the service at {endpoint} does not let in your key {key}; ask whoever runs it \
-         (`apprentice tenant admit` lets a key in)"
+        "the service at {endpoint} does not admit your key {key}; ask its operator \
+         (`apprentice tenant admit` admits a key)"
     )]
-    NotAdmitted { endpoint: String, key: String },
+    NotAdmitted {
+        /// Where the service is.
+        endpoint: String,
+        /// The public half of the client's key.
+        key: String,
+    },
+    /// The service has another key than the client expects.
     #[error(
-        "whoever listens at {endpoint} is not the service with the key {server}; ask whoever runs \
-         it for the right one (`apprentice keys show` prints it)"
+        "the service at {endpoint} does not have the key {server}; ask its operator for the right key \
+         (`apprentice keys show` prints it)"
     )]
-    WrongServer { endpoint: String, server: String },
+    WrongServer {
+        /// Where the client connected.
+        endpoint: String,
+        /// The public key that the client expects.
+        server: String,
+    },
+    /// The endpoint has keys, and the client has none.
     #[error(
-        "the service at {endpoint} lets in only those with a key; name yours with --key FILE and \
-         the service's with --server-key KEY"
+        "the service at {endpoint} needs a key; name your key with --key FILE and the service's key \
+         with --server-key KEY"
     )]
-    KeyWanted { endpoint: String },
+    KeyWanted {
+        /// Where the client connected.
+        endpoint: String,
+    },
+    /// The endpoint has no keys, and the client has one.
     #[error("the service at {endpoint} asks for no key; leave --key and --server-key out")]
-    NoKeyWanted { endpoint: String },
+    NoKeyWanted {
+        /// Where the client connected.
+        endpoint: String,
+    },
+    /// The service had too much work the whole time.
     #[error("the service at {endpoint} stayed busy for {seconds} s: {message}")]
-    Busy { endpoint: String, seconds: u64, message: String },
-    /// The tenant takes more than it may, and waiting did not help or would not.
+    Busy {
+        /// Where the service is.
+        endpoint: String,
+        /// How long the client tried.
+        seconds: u64,
+        /// What the service said last.
+        message: String,
+    },
+    /// The tenant is over a quota, and waiting did not help or would not help.
     #[error("{message}")]
-    OverQuota { quota: Quota, used: u64, limit: u64, message: String },
+    OverQuota {
+        /// Which quota.
+        quota: Quota,
+        /// What the tenant uses, in the unit of the quota.
+        used: u64,
+        /// What it may use, in the unit of the quota.
+        limit: u64,
+        /// For people: one sentence.
+        message: String,
+    },
+    /// The request was not sent.
     #[error("the request has {found} bytes; at most {FRAME_BYTES_MAX} can be sent")]
-    TooLarge { found: usize },
+    TooLarge {
+        /// Bytes of the request.
+        found: usize,
+    },
+    /// The service answered with something else than was asked.
     #[error("the service at {endpoint} answered something else than was asked: {reason}")]
-    Puzzling { endpoint: String, reason: String },
+    Puzzling {
+        /// Where the service is.
+        endpoint: String,
+        /// What it answered.
+        reason: String,
+    },
+    /// The endpoint cannot be used.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
+    /// ZeroMQ cannot connect, send or receive.
     #[error("cannot reach {endpoint}: {reason}")]
-    Socket { endpoint: String, reason: String },
+    Socket {
+        /// Where the client connects.
+        endpoint: String,
+        /// What ZeroMQ says.
+        reason: String,
+    },
 }
 
 /// How long the first attempt waits for its answer; each later one waits twice as long.
 const ATTEMPT: Duration = Duration::from_secs(2);
 /// The longest that one attempt waits.
 const ATTEMPT_MAX: Duration = Duration::from_secs(10);
-/// How long it is tried to find out why an answer is overdue.
+/// How long the client tries to find out why an answer is late.
 const PROBE: Duration = Duration::from_secs(1);
 
 impl Identity {
-    /// Gives a socket this identity, before it connects.
+    /// Sets this identity on a socket. Call it before the socket connects.
+    ///
+    /// - errors: those of ZeroMQ.
     pub fn put_on(&self, socket: &zmq::Socket) -> zmq::Result<()> {
         socket.set_curve_serverkey(&self.server.0)?;
         socket.set_curve_publickey(&self.key.public().0)?;
@@ -107,7 +197,10 @@ impl Identity {
 }
 
 impl Client {
-    /// A client of a service in another process of this machine, at a door without keys.
+    /// A client of a service on this machine, at an endpoint without keys. It connects in the
+    /// background, so it does not matter which of the two starts first.
+    ///
+    /// - errors: the endpoint is not one of this machine.
     pub fn connect(endpoint: &str, user: UserId) -> Result<Client, ClientError> {
         let endpoint = match Endpoint::parse(endpoint)? {
             Endpoint::Network { .. } => {
@@ -118,7 +211,10 @@ impl Client {
         Client::open(&Context::new(), &endpoint, user, None)
     }
 
-    /// A client of a service at a door with keys, here or elsewhere.
+    /// A client of a service on any machine, at an endpoint with keys. It connects in the
+    /// background.
+    ///
+    /// - errors: it is not an endpoint.
     pub fn connect_as(
         endpoint: &str,
         user: UserId,
@@ -128,7 +224,11 @@ impl Client {
         Client::open(&Context::new(), &endpoint, user, Some(identity))
     }
 
-    /// A client that shares `context` with the service.
+    /// A client in the process of the service.
+    ///
+    /// - `context`: that of the service.
+    /// - `endpoint`: `inproc://NAME`.
+    /// - errors: [`ClientError::Socket`].
     pub fn within(context: &Context, endpoint: &str, user: UserId) -> Result<Client, ClientError> {
         Client::open(context, endpoint, user, None)
     }
@@ -155,46 +255,56 @@ impl Client {
             reason: error.to_string(),
         })?;
         let patience = Duration::from_secs(CLIENT_RETRY_S_MAX);
-        let (endpoint, state) = (endpoint.to_owned(), Cell::new(Line::Fresh));
-        Ok(Client { socket, user, endpoint, identity, patience, state })
+        let (endpoint, connection) = (endpoint.to_owned(), Cell::new(Connection::Fresh));
+        Ok(Client { socket, user, endpoint, identity, patience, connection })
     }
 
-    /// How long a request is retried before it is given up; [`CLIENT_RETRY_S_MAX`] at most, since
-    /// request ids are not remembered for ever.
+    /// Sets how long a request is sent again before the client gives up: at most
+    /// [`CLIENT_RETRY_S_MAX`] seconds, because the service forgets request ids later.
     pub fn with_patience(mut self, patience: Duration) -> Client {
         self.patience = patience.min(Duration::from_secs(CLIENT_RETRY_S_MAX));
         self
     }
 
+    /// The person in whose name requests are sent.
     pub fn user(&self) -> &UserId {
         &self.user
     }
 
+    /// The endpoint of the service.
     pub fn endpoint(&self) -> &str {
         &self.endpoint
     }
 
-    /// Who answers there.
+    /// Asks which service this is.
+    ///
+    /// - errors: see [`ClientError`]; so for all requests below.
     pub fn hello(&self) -> Result<Hello, ClientError> {
-        match self.ask(DoorAsk::Hello)? {
+        match self.ask(ServiceAsk::Hello)? {
             Response::Hello(hello) => Ok(hello),
             other => Err(self.puzzled(&other)),
         }
     }
 
+    /// Begins an episode.
     pub fn start(&self, stage: Stage) -> Result<Reply, ClientError> {
         self.command(Command::StartEpisode { stage })
     }
 
+    /// Says something to the robot.
     pub fn say(&self, utterance: &str) -> Result<Reply, ClientError> {
         self.command(Command::Say { utterance: utterance.to_owned() })
     }
 
+    /// Ends the episode before its goal is reached.
     pub fn done(&self) -> Result<Reply, ClientError> {
         self.command(Command::Done)
     }
 
-    /// `actions` are numbers of the episode's actions, a contiguous run; empty for "nothing did".
+    /// Says which actions an utterance meant.
+    ///
+    /// - `explains`: the record of the answer to the utterance ([`Teachable`](crate::Teachable)).
+    /// - `actions`: numbers of actions of the episode, without a gap. Empty: no action explains it.
     pub fn teach(
         &self,
         explains: Seq,
@@ -204,18 +314,26 @@ impl Client {
         self.command(Command::Teach { explains, actions, on_clash })
     }
 
+    /// Ends the teaching and begins a training. See [`Client::wait_until_learned`].
     pub fn finish_teaching(&self) -> Result<Reply, ClientError> {
         self.command(Command::FinishTeaching)
     }
 
+    /// Forgets a lesson and begins a training.
+    ///
+    /// - `lesson`: the record of the lesson.
     pub fn forget(&self, lesson: Seq) -> Result<Reply, ClientError> {
         self.command(Command::Forget { lesson })
     }
 
+    /// Withdraws the person. No command is accepted afterwards.
+    ///
+    /// - `reason`: may be empty.
     pub fn close(&self, reason: &str) -> Result<Reply, ClientError> {
         self.command(Command::Close { reason: reason.to_owned() })
     }
 
+    /// Asks for the phase, the goal, the actions so far and what may be taught.
     pub fn status(&self) -> Result<Status, ClientError> {
         match self.ask(Query::Status)? {
             Response::Status(status) => Ok(status),
@@ -223,6 +341,7 @@ impl Client {
         }
     }
 
+    /// Asks what the robot sees and holds.
     pub fn look(&self) -> Result<View, ClientError> {
         match self.ask(Query::Look)? {
             Response::Look(view) => Ok(view),
@@ -230,6 +349,7 @@ impl Client {
         }
     }
 
+    /// Asks for the exemplars that answers come from.
     pub fn known(&self) -> Result<Vec<KnownExemplar>, ClientError> {
         match self.ask(Query::Known)? {
             Response::Known(known) => Ok(known),
@@ -237,15 +357,16 @@ impl Client {
         }
     }
 
-    /// Where new records of this client's tenant are published.
+    /// Asks where new records of the client's tenant are published. Use a
+    /// [`Follower`](crate::Follower) to read them.
     pub fn feed(&self) -> Result<FeedView, ClientError> {
-        match self.ask(DoorAsk::Feed)? {
+        match self.ask(ServiceAsk::Feed)? {
             Response::Feed(feed) => Ok(feed),
             other => Err(self.puzzled(&other)),
         }
     }
 
-    /// Where all streams of this client's tenant end, in the order of their keys.
+    /// Asks where all streams of the client's tenant end. They come in the order of their keys.
     pub fn heads(&self) -> Result<Vec<HeadView>, ClientError> {
         let (mut all, limit) = (Vec::<HeadView>::new(), HEADS_IN_REPLY_MAX as u32);
         loop {
@@ -263,7 +384,8 @@ impl Client {
         }
     }
 
-    /// Records of a stream as they are kept, from `from` on; as many as fit an answer.
+    /// Asks for encrypted records of a stream, from the record `from` on. An answer has at most
+    /// [`RECORDS_IN_REPLY_MAX`] of them; ask again from the next record while `more` is true.
     pub fn records(&self, stream: StreamKey, from: Seq) -> Result<SealedRecords, ClientError> {
         let limit = RECORDS_IN_REPLY_MAX as u32;
         match self.ask(Ask::Archive(ArchiveAsk::Sealed { stream, from, limit }))? {
@@ -272,7 +394,7 @@ impl Client {
         }
     }
 
-    /// As [`Client::records`], in the clear.
+    /// As [`Client::records`], decrypted.
     pub fn plain_records(&self, stream: StreamKey, from: Seq) -> Result<PlainRecords, ClientError> {
         let limit = RECORDS_IN_REPLY_MAX as u32;
         match self.ask(Ask::Archive(ArchiveAsk::Plain { stream, from, limit }))? {
@@ -285,9 +407,9 @@ impl Client {
         self.identity.as_ref()
     }
 
-    /// Gives an operator's order.
+    /// Gives an order. Needs a key with the role operator.
     ///
-    /// - `tenant`: whom it is about; none: the tenant of this client's own key.
+    /// - `tenant`: the tenant that it is about; none: the tenant of the client's key.
     pub fn order(&self, tenant: Option<TenantId>, order: Order) -> Result<Ordered, ClientError> {
         match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::Give(order) }))? {
             Response::Ordered(ordered) => Ok(ordered),
@@ -295,7 +417,7 @@ impl Client {
         }
     }
 
-    /// The tenants that this operator may see, or one of them.
+    /// Asks for the tenants that this operator may see, or for one of them.
     pub fn tenants(&self, tenant: Option<TenantId>) -> Result<Vec<TenantView>, ClientError> {
         match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::List }))? {
             Response::Tenants(tenants) => Ok(tenants),
@@ -303,8 +425,12 @@ impl Client {
         }
     }
 
-    /// Erases a person, for good. Under a fresh request id: after an answer was lost, look whether
-    /// the name is in use again before asking anew, or its new bearer would be erased.
+    /// Erases a person: destroys their key, so that their records can no longer be decrypted.
+    ///
+    /// If no answer comes, look whether the name is in use again before you call this a second
+    /// time: a second call is a new request and would erase the new person with this name.
+    ///
+    /// - `tenant`: the person's tenant; none: the tenant of the client's key.
     pub fn erase(&self, tenant: Option<TenantId>, user: UserId) -> Result<ErasedView, ClientError> {
         match self.ask(Ask::Order(TenantAsk { tenant, verb: TenantVerb::Erase { user } }))? {
             Response::Erased(erased) => Ok(erased),
@@ -312,9 +438,9 @@ impl Client {
         }
     }
 
-    /// Waits until the training that runs is over, if one does.
+    /// Waits until no training is queued or running.
     ///
-    /// - errors: [`ClientError::NoAnswer`] when it is not over within `limit`.
+    /// - errors: [`ClientError::NoAnswer`] if it takes longer than `limit`.
     pub fn wait_until_learned(&self, limit: Duration) -> Result<Waited, ClientError> {
         let end = Instant::now() + limit;
         loop {
@@ -341,8 +467,8 @@ impl Client {
         self.command_again(fresh_id(), command)
     }
 
-    /// Sends a command under a request id of the caller's: to ask again after a restart of either
-    /// end what came of it. A new command must have a new id.
+    /// Sends a command under a request id that you choose. If you keep the id, you can ask for the
+    /// same reply after a restart of the client or the service. A new command needs a new id.
     pub fn command_again(&self, id: RequestId, command: Command) -> Result<Reply, ClientError> {
         match self.ask_again(id, command.into())? {
             Response::Reply(reply) => Ok(reply),
@@ -363,7 +489,7 @@ impl Client {
         if bytes.len() > FRAME_BYTES_MAX {
             return Err(ClientError::TooLarge { found: bytes.len() });
         }
-        if self.state.get() == Line::Closed {
+        if self.connection.get() == Connection::Refused {
             self.reconnect()?;
         }
         let end = Instant::now() + self.patience + waits;
@@ -379,8 +505,8 @@ impl Client {
                     self.send(&bytes)?;
                     end.min(now + attempt + waits)
                 }
-                // Between a Busy and the next attempt: listening, since an earlier attempt's
-                // answer may still come.
+                // After a Busy and before the next attempt, the answer to an earlier attempt may
+                // still come.
                 _ => end.min(now + pause),
             };
             match self.answer_to(id, until)? {
@@ -390,7 +516,7 @@ impl Client {
                     send = false;
                 }
                 Some(Response::QuotaExceeded(over)) => match over.retry_after_ms {
-                    // Later than anybody waits: said at once.
+                    // If that is later than the client would wait, it gives up at once.
                     Some(ms) if now + Duration::from_millis(u64::from(ms)) < end => {
                         pause = Duration::from_millis(u64::from(ms.max(1)));
                         busy = Some(over.message);
@@ -419,7 +545,9 @@ impl Client {
         }
     }
 
-    /// An answer is overdue: whether that will not change by waiting.
+    /// An answer is late. Finds out whether waiting can help.
+    ///
+    /// - errors: it cannot, and why.
     fn find_out(&self) -> Result<(), ClientError> {
         if self.endpoint.starts_with("inproc:") {
             return Ok(());
@@ -427,52 +555,55 @@ impl Client {
         let endpoint = self.endpoint.clone();
         let error = match (probe(&endpoint, self.identity.as_ref(), PROBE), &self.identity) {
             (Probe::Silence, _) | (Probe::BrokenOff | Probe::NotAdmitted, None) => return Ok(()),
-            (Probe::LetIn, _) => {
-                // Let in now, and perhaps not when this client came.
-                return match self.state.get() {
-                    Line::Heard => Ok(()),
-                    Line::Fresh | Line::Closed => self.reconnect(),
+            (Probe::Accepted, _) => {
+                // Accepted now, but perhaps not when this client connected.
+                return match self.connection.get() {
+                    Connection::Used => Ok(()),
+                    Connection::Fresh | Connection::Refused => self.reconnect(),
                 };
             }
             (Probe::NotAdmitted, Some(identity)) => {
                 ClientError::NotAdmitted { endpoint, key: z85::show(identity.key.public()) }
             }
-            // A service that asks for no key may break off as a wrong one does, but it lets in a client
-            // that brings none.
-            (Probe::BrokenOff, Some(_)) if probe(&endpoint, None, PROBE) == Probe::LetIn => {
+            // A service without keys may end the handshake, as a service with another key does. But
+            // it accepts a client without a key.
+            (Probe::BrokenOff, Some(_)) if probe(&endpoint, None, PROBE) == Probe::Accepted => {
                 ClientError::NoKeyWanted { endpoint }
             }
             (Probe::BrokenOff, Some(identity)) => {
                 ClientError::WrongServer { endpoint, server: z85::show(&identity.server) }
             }
-            (Probe::OtherDoor, None) => ClientError::KeyWanted { endpoint },
-            (Probe::OtherDoor, Some(_)) => ClientError::NoKeyWanted { endpoint },
+            (Probe::OtherMechanism, None) => ClientError::KeyWanted { endpoint },
+            (Probe::OtherMechanism, Some(_)) => ClientError::NoKeyWanted { endpoint },
         };
-        self.state.set(Line::Closed);
+        self.connection.set(Connection::Refused);
         Err(error)
     }
 
     fn reconnect(&self) -> Result<(), ClientError> {
-        // Without a connection there is none to give up.
+        // This fails if there is no connection, which does not matter.
         let _ = self.socket.disconnect(&self.endpoint);
         self.socket.connect(&self.endpoint).map_err(|error| self.socket_error(error))?;
-        self.state.set(Line::Fresh);
+        self.connection.set(Connection::Fresh);
         Ok(())
     }
 
     fn send(&self, bytes: &[u8]) -> Result<(), ClientError> {
         match self.socket.send(bytes, zmq::DONTWAIT) {
-            // A full pipe: the peer has been away for long. The next attempt sends again.
+            // The queue is full, because the service has been away for long. The next attempt sends
+            // it again.
             Ok(()) | Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => Ok(()),
             Err(error) => Err(self.socket_error(error)),
         }
     }
 
-    /// The answer to `id`, or none until `until`. Answers to earlier requests are dropped.
+    /// Waits for the answer to `id`. Answers to other requests are dropped.
+    ///
+    /// - returns: none if there was none until `until`.
     fn answer_to(&self, id: RequestId, until: Instant) -> Result<Option<Response>, ClientError> {
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            // Rounded up, or the last millisecond would be spent spinning.
+            // Rounded up, or the last millisecond would be a busy loop.
             let left_ms = left.as_micros().div_ceil(1_000) as i64;
             match self.socket.poll(zmq::POLLIN, left_ms) {
                 Ok(0) if Instant::now() >= until => return Ok(None),
@@ -482,7 +613,7 @@ impl Client {
             }
             let frames = match self.socket.recv_multipart(zmq::DONTWAIT) {
                 Ok(frames) => {
-                    self.state.set(Line::Heard);
+                    self.connection.set(Connection::Used);
                     frames
                 }
                 Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => continue,
@@ -520,7 +651,9 @@ impl Client {
     }
 }
 
-/// A request id that nobody else has.
+/// A request id from random bytes of the operating system. No other request has it.
+///
+/// - panics: if the operating system gives no random bytes.
 pub fn fresh_id() -> RequestId {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).expect("the operating system gives random bytes");

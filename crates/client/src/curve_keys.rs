@@ -1,4 +1,4 @@
-//! CURVE keys and their files. A file is a ZeroMQ certificate, as `pyzmq` and `czmq` read it too.
+//! CURVE keys and their files. A file is a ZeroMQ certificate, which `pyzmq` and `czmq` can read.
 
 use std::fmt;
 use std::fs::{self, OpenOptions};
@@ -11,46 +11,84 @@ use zeroize::Zeroizing;
 
 use crate::z85;
 
-/// A CURVE key with its secret half.
+/// A CURVE key: its public half and its secret half. The secret half is overwritten when the key is
+/// dropped, and is never printed.
 #[derive(Clone)]
 pub struct CurveKey {
     public: PublicKey,
     secret: Zeroizing<[u8; 32]>,
 }
 
-/// Why a key cannot be had.
+/// Why there is no key.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CurveKeyError {
+    /// A key that may be in use is never replaced.
     #[error(
         "the key file {path} already exists; name another file, or remove it if it is not needed"
     )]
-    Exists { path: String },
+    Exists {
+        /// The file.
+        path: String,
+    },
+    /// There is no such file.
     #[error("there is no key file {path}; make one with `apprentice keys new --out {path}`")]
-    Absent { path: String },
+    Absent {
+        /// The file.
+        path: String,
+    },
+    /// Other users of the machine can read the file.
     #[error("the key file {path} can be read by others (mode {mode:03o}); run: chmod 600 {path}")]
-    Permissions { path: String, mode: u32 },
+    Permissions {
+        /// The file.
+        path: String,
+        /// Its permissions, such as octal 644.
+        mode: u32,
+    },
+    /// The file has no key in it.
     #[error("the key file {path} is damaged: {reason}; restore it, or make another key")]
-    Malformed { path: String, reason: &'static str },
+    Malformed {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// The file cannot be read or written.
     #[error("the key file {path} cannot be used: {reason}")]
-    Io { path: String, reason: String },
+    Io {
+        /// The file.
+        path: String,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// The text is neither a public key nor a file with one.
     #[error(
         "{text:?} is not a public key: expected 40 characters, or a file that contains them, such as \
          the .pub file that `apprentice keys new` writes"
     )]
-    NoPublicKey { text: String },
+    NoPublicKey {
+        /// Its first characters.
+        text: String,
+    },
+    /// ZeroMQ was built without CURVE.
     #[error("this build of ZeroMQ cannot make keys: {reason}; {}", REBUILD_WITH_CURVE)]
-    NoCurve { reason: String },
+    NoCurve {
+        /// What ZeroMQ says.
+        reason: String,
+    },
 }
 
-/// What to do about a ZeroMQ without CURVE.
+/// Part of a message: what to do if ZeroMQ was built without CURVE.
 pub const REBUILD_WITH_CURVE: &str = "build apprentice inside its own workspace, where Cargo.toml \
      replaces zeromq-src by deploy/libzmq, or listen on tcp://127.0.0.1:PORT only";
 
-/// More than a certificate ever has, so that a wrong name does not fill the memory.
+/// Bytes that are read of a file. A certificate has fewer; a file that was named by mistake must
+/// not fill the memory.
 const KEY_FILE_BYTES_MAX: u64 = 64 * 1024;
 
 impl CurveKey {
-    /// A new key from the system's randomness.
+    /// Makes a key from random bytes of the operating system.
+    ///
+    /// - errors: [`CurveKeyError::NoCurve`].
     pub fn new() -> Result<CurveKey, CurveKeyError> {
         let pair = zmq::CurveKeyPair::new()
             .map_err(|error| CurveKeyError::NoCurve { reason: error.to_string() })?;
@@ -58,18 +96,21 @@ impl CurveKey {
         Ok(CurveKey { public: PublicKey(pair.public_key), secret })
     }
 
+    /// The public half.
     pub fn public(&self) -> &PublicKey {
         &self.public
     }
 
+    /// The secret half.
     pub fn secret(&self) -> &[u8; 32] {
         &self.secret
     }
 
-    /// Writes the key into a new file that its owner alone can read, and its public half beside it
-    /// with the ending `.pub`. Durable on return.
+    /// Writes the key into a new file that only its owner can read, and the public half into a file
+    /// beside it ([`public_file`]). Both are durable on return.
     ///
-    /// - errors: the file is there: a key that is in use must not be written over.
+    /// - returns: the file with the public half.
+    /// - errors: one of the files exists, or cannot be written.
     pub fn write_new(&self, path: &Path) -> Result<PathBuf, CurveKeyError> {
         let secret = Zeroizing::new(format!(
             "# A secret CURVE key of apprentice. Anyone who has it can connect as you.\n\
@@ -89,7 +130,9 @@ impl CurveKey {
         }
     }
 
-    /// - errors: no such file, one that others can read, or no key in it.
+    /// Reads the key from a file that [`CurveKey::write_new`] wrote.
+    ///
+    /// - errors: there is no such file, other users can read it, or it has no key in it.
     pub fn read(path: &Path) -> Result<CurveKey, CurveKeyError> {
         let (text, mode) = read_text(path)?;
         if mode & 0o077 != 0 {
@@ -104,7 +147,9 @@ impl CurveKey {
         Ok(CurveKey { public, secret: Zeroizing::new(secret) })
     }
 
-    /// The key of `path`, which is made when it is not there.
+    /// Reads the key from a file. Makes the key and the file if there is none.
+    ///
+    /// - errors: as [`CurveKey::read`] and [`CurveKey::write_new`].
     pub fn read_or_make(path: &Path) -> Result<CurveKey, CurveKeyError> {
         match CurveKey::read(path) {
             Err(CurveKeyError::Absent { .. }) => {}
@@ -116,14 +161,17 @@ impl CurveKey {
     }
 }
 
-// The secret must not slip into a log line.
+// The secret half must not get into a log line.
 impl fmt::Debug for CurveKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "CurveKey({}, ..)", z85::show(&self.public))
     }
 }
 
-/// A public key as a person names it: its 40 characters, or a file that holds it.
+/// Reads a public key as a person names it.
+///
+/// - `text`: the 40 characters of the key, or the name of a file that contains them.
+/// - errors: it is neither, or the file cannot be read.
 pub fn read_public(text: &str) -> Result<PublicKey, CurveKeyError> {
     if let Some(key) = z85::read(text) {
         return Ok(key);
@@ -180,7 +228,7 @@ fn write(path: &Path, bytes: &[u8], mode: u32) -> Result<(), CurveKeyError> {
         .map_err(cannot)
 }
 
-/// Where the public half of the key in `path` stands.
+/// The file with the public half of the key in `path`: the same name with `.pub` added.
 pub fn public_file(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".pub");
@@ -204,6 +252,12 @@ mod tests {
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
         let read = CurveKey::read(&path).unwrap();
         assert_eq!((read.public(), read.secret()), (key.public(), key.secret()));
+        // A ZeroMQ certificate, which other programs read.
+        let text = fs::read_to_string(&path).unwrap();
+        for (name, half) in [("public-key", &key.public().0), ("secret-key", key.secret())] {
+            let line = format!("    {name} = \"{}\"", zmq::z85_encode(half).unwrap());
+            assert!(text.lines().any(|it| it == line), "{name}");
+        }
         for named in [&*z85::show(key.public()), public.to_str().unwrap(), path.to_str().unwrap()] {
             assert_eq!(read_public(named).unwrap(), *key.public());
         }

@@ -1,47 +1,87 @@
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// Where a gateway listens, and clients reach it.
+/// Where a service listens, and where clients connect.
+///
+/// ```
+/// use apprentice_client::Endpoint;
+///
+/// let endpoint = Endpoint::parse("tcp://localhost:7117")?;
+/// assert_eq!(endpoint.to_string(), "tcp://127.0.0.1:7117");
+/// assert!(Endpoint::parse("localhost:7117").is_err(), "the transport is missing");
+/// // Other machines can reach this address, so a service listens there with keys only.
+/// assert!(Endpoint::parse_open("tcp://192.0.2.1:7117").is_err());
+/// # Ok::<(), apprentice_client::EndpointError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Endpoint {
-    /// On this machine's loopback alone. Port 0 takes a free one.
+    /// An address that only this machine can reach. A service that listens at port 0 takes a free
+    /// port.
     Loopback(SocketAddr),
-    /// A local socket file.
+    /// The path of a local socket.
     Ipc(String),
-    /// What other machines can reach: an address, a host's name or a network card's.
-    Network { host: String, port: u16 },
+    /// An address that other machines can reach.
+    Network {
+        /// An IP address, or the name of a host or of a network card. IPv6 in square brackets.
+        host: String,
+        /// Port 0: a service that listens takes a free port.
+        port: u16,
+    },
 }
 
-/// Why the gateway will not listen there.
+/// Why a text is not an endpoint, or must not be used as one.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum EndpointError {
+    /// It is not written as an endpoint.
     #[error(
         "{endpoint:?} is not an endpoint; expected tcp://ADDRESS:PORT, such as tcp://127.0.0.1:7117, or \
          ipc://PATH"
     )]
-    Form { endpoint: String },
+    Form {
+        /// The first characters of the text.
+        endpoint: String,
+    },
+    /// A service without keys must listen where only this machine can reach it.
     #[error(
         "{endpoint} would be open to the network, where anyone could speak for every user; use keys \
          (`--curve {endpoint}`), or listen on tcp://127.0.0.1:PORT"
     )]
-    NotLoopback { endpoint: String },
+    NotLoopback {
+        /// The text.
+        endpoint: String,
+    },
+    /// A client without a key must connect to this machine.
     #[error(
         "{endpoint} is on another machine, so you need keys; name your key with --key FILE and the \
          service's key with --server-key KEY"
     )]
-    KeyWanted { endpoint: String },
+    KeyWanted {
+        /// The text.
+        endpoint: String,
+    },
+    /// The operating system does not take a path that long.
     #[error("the path of {endpoint:?} has {found} bytes; the limit for a local socket is {max}")]
-    PathTooLong { endpoint: String, found: usize, max: usize },
+    PathTooLong {
+        /// The text.
+        endpoint: String,
+        /// Bytes of the path.
+        found: usize,
+        /// Bytes that it may have.
+        max: usize,
+    },
 }
 
-/// Bytes of a local socket's path (`sockaddr_un.sun_path`, its closing zero left out).
+/// Bytes of the path of a local socket: `sockaddr_un.sun_path` without its closing zero.
 const IPC_PATH_BYTES_MAX: usize = 107;
 
-/// Bytes of a host's name in the domain name system.
+/// Bytes of the name of a host (RFC 1035).
 const HOST_BYTES_MAX: usize = 253;
 
 impl Endpoint {
-    /// - errors: no endpoint at all.
+    /// Reads `tcp://HOST:PORT` or `ipc://PATH`. The port `*` is port 0, and the host `*` means all
+    /// addresses of the machine.
+    ///
+    /// - errors: it is not written as an endpoint, or its path is too long.
     pub fn parse(text: &str) -> Result<Endpoint, EndpointError> {
         let form = || EndpointError::Form { endpoint: text.chars().take(120).collect() };
         if let Some(path) = text.strip_prefix("ipc://") {
@@ -66,7 +106,7 @@ impl Endpoint {
         let literal = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
         let read = match (literal, host) {
             (Some(literal), _) => Some(IpAddr::V6(literal.parse().map_err(|_| form())?)),
-            // Written out, so that no name service can say otherwise.
+            // As an address, so that no name service can change it.
             (None, "localhost") => Some(IpAddr::V4(Ipv4Addr::LOCALHOST)),
             (None, "*") => Some(IpAddr::V4(Ipv4Addr::UNSPECIFIED)),
             (None, host) => host.parse::<Ipv4Addr>().ok().map(IpAddr::V4),
@@ -90,10 +130,10 @@ impl Endpoint {
         }
     }
 
-    /// Where the single user of a machine may be served without a key: whoever reaches it can be
-    /// anyone.
+    /// Reads an endpoint for a service without keys. Everybody who can connect there can speak for
+    /// every user, so only this machine may reach it.
     ///
-    /// - errors: others than this machine could reach it.
+    /// - errors: as [`Endpoint::parse`], or other machines could reach it.
     pub fn parse_open(text: &str) -> Result<Endpoint, EndpointError> {
         match Endpoint::parse(text)? {
             Endpoint::Network { .. } => {
@@ -103,7 +143,7 @@ impl Endpoint {
         }
     }
 
-    /// Whether a socket for it must speak IPv6.
+    /// True if a socket for it must use IPv6.
     pub fn is_ipv6(&self) -> bool {
         match self {
             Endpoint::Loopback(address) => address.is_ipv6(),

@@ -4,19 +4,20 @@ use serde::{Deserialize, Serialize};
 use crate::protocol::{PlainView, SealedView};
 use crate::wire;
 
-/// A message of the feed, beside its topic.
+/// A message of the feed: the frame after its topic.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FeedMessage {
+    /// The version of the wire, [`wire::VERSION`].
     pub v: u64,
     /// Names this run of the feed.
     pub start: RequestId,
-    /// Its place among all records of the tenant since then, from 1 on; of a beat, how many there
-    /// were.
+    /// The number of the record among all records of the tenant in this run, from 1. For a beat:
+    /// how many records there were.
     pub number: u64,
-    /// Of the sealed feed; none for a beat.
+    /// A record of the sealed feed; none for a beat.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sealed: Option<SealedView>,
-    /// Of the plain feed; none for a beat.
+    /// A record of the plain feed; none for a beat.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub plain: Option<PlainView>,
 }
@@ -27,7 +28,9 @@ impl FeedMessage {
         wire::pack(self)
     }
 
-    /// - errors: a sentence; never panics, whatever the bytes.
+    /// Reads one MessagePack map.
+    ///
+    /// - errors: a sentence. No bytes make it panic.
     pub fn decode(bytes: &[u8]) -> Result<FeedMessage, String> {
         let message: FeedMessage = wire::unpack(bytes)?;
         match message.v == wire::VERSION {
@@ -37,6 +40,6 @@ impl FeedMessage {
     }
 }
 
-/// The topic of messages that carry no record, and tell how many there were. A record's topic is its
-/// stream, in hexadecimal digits.
+/// The topic of messages without a record, which say how many records there were. The topic of a
+/// record is its stream, in hexadecimal digits.
 pub const BEAT: &str = "beat";

@@ -1,4 +1,4 @@
-//! The other end of the feed: misses nothing, whatever the feed drops.
+//! Follows the feed, and asks the service for the records that the feed dropped.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -8,39 +8,46 @@ use apprentice_core::ids::{Digest, RequestId, Seq, StreamKey, WithinTenant};
 use crate::protocol::{HeadView, PlainView, SealedView};
 use crate::{Client, ClientError, Context, FeedMessage};
 
-/// Follows all streams of a tenant: gives each record once, each stream in its order. What the feed
-/// dropped is asked for at the door and held against the digests that were seen.
+/// Follows all streams of a tenant. It gives each record once, and the records of a stream in their
+/// order. Records that the feed dropped are requested from the service. Every record is compared
+/// with the digest of the record before it.
 pub struct Follower {
     client: Client,
     kind: Kind,
     context: Context,
     socket: Option<(String, zmq::Socket)>,
     waiting_max: i32,
-    /// The run of the feed, and the last number that is accounted for.
+    /// The run of the feed, and the last number in it that is not missing.
     heard: Option<(RequestId, u64)>,
     positions: WithinTenant<Position>,
     ready: VecDeque<Followed>,
-    /// When to look at the door whether anything happened, unless the feed is heard before.
+    /// When to ask the service for new records, unless the feed sends a message before.
     look_at: Instant,
-    /// Records that were asked for at the door.
+    /// Records that the service was asked for.
     fetched: u64,
 }
 
-/// Up to where a stream was followed.
+/// The last record of a stream that a follower has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Position {
+    /// Its number in the stream.
     pub seq: Seq,
+    /// Its digest.
     pub digest: Digest,
 }
 
-/// A record, once.
+/// What a follower gives.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Followed {
+    /// An encrypted record.
     Sealed(SealedView),
+    /// A decrypted record.
     Plain(PlainView),
-    /// These records are of a person who was erased; nobody can open them.
+    /// The person was erased. Their records can no longer be decrypted.
     Erased {
+        /// The person's stream.
         stream: StreamKey,
+        /// Its last record.
         last: Position,
     },
 }
@@ -51,32 +58,46 @@ enum Kind {
     Plain,
 }
 
-/// Why following cannot go on.
+/// Why a follower stops.
 #[derive(Debug, thiserror::Error)]
 pub enum FollowError {
+    /// The service did not answer, or its answer was a refusal.
     #[error(transparent)]
     Client(#[from] ClientError),
+    /// ZeroMQ cannot connect to the feed or read from it.
     #[error("cannot connect to the feed at {endpoint}: {reason}")]
-    Socket { endpoint: String, reason: String },
-    /// The service shows another past than it showed before.
+    Socket {
+        /// The endpoint of the feed.
+        endpoint: String,
+        /// What ZeroMQ says.
+        reason: String,
+    },
+    /// The log was changed: it contradicts a record that the follower has. Keep what you have and
+    /// ask the operator.
     #[error("this is not the log that was followed before: {reason}")]
-    Rewritten { reason: String },
+    Rewritten {
+        /// Which record, and what is wrong with it.
+        reason: String,
+    },
 }
 
-/// Silence after which it is asked whether anything happened: a feed beats every second.
+/// How long the feed may be silent before the service is asked for new records. A feed sends a beat
+/// every second.
 const SILENCE: Duration = Duration::from_secs(5);
-/// After which it is asked where the feed is, when it was nowhere.
+/// How long after a closed feed the service is asked again where it is.
 const NOT_OPEN_YET: Duration = Duration::from_millis(500);
 
 impl Follower {
-    /// Follows sealed records, as an auditor or operator.
+    /// Follows encrypted records. Needs a key with the role auditor or operator.
     ///
-    /// - `positions`: up to where they are known already.
+    /// - `positions`: the last record of each stream that you already have; empty to get all.
     pub fn sealed(client: Client, positions: WithinTenant<Position>) -> Follower {
         Follower::new(client, Kind::Sealed, positions)
     }
 
-    /// Follows records in the clear, as an operator.
+    /// Follows decrypted records. Needs a key with the role operator.
+    ///
+    /// - `positions`: the last record of each stream that you already have; empty to get all.
     pub fn plain(client: Client, positions: WithinTenant<Position>) -> Follower {
         Follower::new(client, Kind::Plain, positions)
     }
@@ -96,24 +117,27 @@ impl Follower {
         }
     }
 
-    /// How many messages may wait to be read before they are dropped.
+    /// Sets how many messages of the feed may wait to be read; 10,000 otherwise. Further messages
+    /// are dropped, and their records are requested from the service.
     pub fn with_waiting_max(mut self, messages: i32) -> Follower {
         self.waiting_max = messages.max(1);
         self
     }
 
+    /// The last record of each stream that was given. Keep it to continue later.
     pub fn positions(&self) -> &WithinTenant<Position> {
         &self.positions
     }
 
-    /// Records that the feed did not bring.
+    /// Records that came from the service because the feed did not send them.
     pub fn fetched(&self) -> u64 {
         self.fetched
     }
 
-    /// The next record, or none when there was none within `limit`.
+    /// The next record.
     ///
-    /// - errors: [`FollowError::Client`] when this key may not follow (any more), too.
+    /// - returns: none if there was none within `limit`.
+    /// - errors: [`FollowError::Client`] also if this key may not follow, or no longer.
     pub fn next(&mut self, limit: Duration) -> Result<Option<Followed>, FollowError> {
         let end = Instant::now() + limit;
         loop {
@@ -139,17 +163,18 @@ impl Follower {
         }
     }
 
-    /// Subscribes where the feed is now. Before catching up, so that nothing falls in between.
+    /// Subscribes where the feed is now. This comes before [`Follower::catch_up`], so that no
+    /// record is missed between the two.
     fn listen(&mut self) -> Result<(), FollowError> {
         let view = self.client.feed()?;
         let endpoint = match self.kind {
             Kind::Sealed => view.sealed,
             Kind::Plain => view.plain,
         };
-        // Anew, even where the endpoint is the same: a connection that was turned away once stays
-        // silent for ever, and nobody can see that.
+        // A new socket even if the endpoint is the same: a connection that was refused once stays
+        // silent, and shows no error.
         self.socket = None;
-        // Being opened anew, after a key was taken back: soon.
+        // The feed is closed for a moment after a key was revoked.
         let Some(endpoint) = endpoint else { return Ok(()) };
         let endpoint = reachable(&endpoint, self.client.endpoint());
         let open = || -> zmq::Result<zmq::Socket> {
@@ -191,7 +216,7 @@ impl Follower {
             Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => return Ok(None),
             Err(error) => return Err(failed(error)),
         };
-        // What cannot be read is as good as dropped: its number will be missing.
+        // A message that cannot be read counts as dropped: its number will be missing.
         let [_, body] = &frames[..] else { return Ok(None) };
         Ok(FeedMessage::decode(body).ok())
     }
@@ -210,7 +235,7 @@ impl Follower {
             (None, Some(known)) => number <= known,
         };
         if !in_turn {
-            // All that was published up to this number is durable: it is found at the door.
+            // All records up to this number are durable, so the service has them.
             self.catch_up()?;
         }
         let last = known.map_or(number, |known| known.max(number));
@@ -221,7 +246,8 @@ impl Follower {
         }
     }
 
-    /// A record from the feed: given if it is next, asked for with those before it if it is not.
+    /// Takes a record from the feed. If it is not the next of its stream, the records before it are
+    /// requested as well.
     fn follow(&mut self, record: Followed) -> Result<(), FollowError> {
         let (stream, seq, digest) = match &record {
             Followed::Sealed(record) => (record.stream, record.seq, record.digest),
@@ -239,7 +265,7 @@ impl Follower {
         }
     }
 
-    /// Asks where all streams end, and for what is missing.
+    /// Asks where all streams end, and requests the records that are missing.
     fn catch_up(&mut self) -> Result<(), FollowError> {
         let heads = self.client.heads()?;
         for head in &heads {
@@ -254,7 +280,7 @@ impl Follower {
         }
     }
 
-    /// Asks for the records of a stream up to `head`, if they were not followed yet.
+    /// Requests the records of a stream up to `head` that are missing.
     fn fetch(&mut self, head: HeadView) -> Result<(), FollowError> {
         let stream = head.stream;
         loop {
@@ -296,7 +322,7 @@ impl Follower {
         }
     }
 
-    /// The next record of its stream.
+    /// Gives a record, which must be the next of its stream.
     fn give(&mut self, record: Followed) -> Result<(), FollowError> {
         let of = |stream: StreamKey| self.positions.get(&stream).copied();
         let (stream, at) = match &record {
@@ -339,13 +365,14 @@ fn rewritten(stream: StreamKey, seq: Seq) -> FollowError {
     FollowError::Rewritten { reason }
 }
 
-/// A service that listens on all its addresses names none: then the one it was reached at.
-fn reachable(endpoint: &str, door: &str) -> String {
+/// The endpoint of a feed as a client can reach it. A service that listens at all addresses names
+/// none of them; then it is the address at which the client reached the service.
+fn reachable(endpoint: &str, service: &str) -> String {
     let port = |host: &str| endpoint.strip_prefix(host).and_then(|rest| rest.strip_prefix(':'));
     let Some(port) = port("tcp://0.0.0.0").or_else(|| port("tcp://[::]")) else {
         return endpoint.to_owned();
     };
-    match door.rsplit_once(':') {
+    match service.rsplit_once(':') {
         Some((host, _)) if host.starts_with("tcp://") => format!("{host}:{port}"),
         _ => format!("tcp://127.0.0.1:{port}"),
     }
@@ -356,11 +383,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_feed_on_all_addresses_is_reached_where_the_door_was() {
-        let door = "tcp://robot.example:7117";
-        assert_eq!(reachable("tcp://0.0.0.0:7200", door), "tcp://robot.example:7200");
+    fn a_feed_on_all_addresses_is_reached_where_the_service_was() {
+        let service = "tcp://robot.example:7117";
+        assert_eq!(reachable("tcp://0.0.0.0:7200", service), "tcp://robot.example:7200");
         assert_eq!(reachable("tcp://[::]:7200", "tcp://[::1]:7117"), "tcp://[::1]:7200");
-        assert_eq!(reachable("tcp://10.0.0.7:7200", door), "tcp://10.0.0.7:7200");
-        assert_eq!(reachable("ipc:///run/feed.lab.sealed", door), "ipc:///run/feed.lab.sealed");
+        assert_eq!(reachable("tcp://10.0.0.7:7200", service), "tcp://10.0.0.7:7200");
+        assert_eq!(reachable("ipc:///run/feed.lab.sealed", service), "ipc:///run/feed.lab.sealed");
     }
 }

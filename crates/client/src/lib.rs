@@ -1,6 +1,11 @@
-//! The wire of `apprentice` and its client: what can be asked of a service, what it answers, and how
-//! both travel over ZeroMQ. Nothing here knows how a service works inside; `schema/wire.md`
-//! describes the same for programs in other languages.
+//! The wire of `apprentice` and its client: what you can ask of a service, what it answers, and how
+//! both travel over ZeroMQ. `schema/wire.md` describes the same for programs in other languages.
+//!
+//! [`Client`] sends one person's requests; `examples/talk.rs` shows it at work. [`Follower`] keeps
+//! a copy of a tenant's records. [`protocol`] has the requests and the answers, and [`wire`] their
+//! encoding.
+
+#![warn(missing_docs)]
 
 mod client;
 mod curve_keys;
@@ -20,5 +25,5 @@ pub use follower::{FollowError, Followed, Follower, Position};
 pub use protocol::*;
 pub use z85::show as show_key;
 
-/// A ZeroMQ context: what a client inside the process shares with the gateway.
+/// A ZeroMQ context. A client in the same process shares it with the service.
 pub type Context = zmq::Context;

@@ -1,6 +1,6 @@
-//! Why a service does not answer: one handshake on a socket of its own, watched. A client asks this
-//! only when an answer is overdue, so that its own socket needs no monitor, which would stall
-//! handshakes while nobody reads it.
+//! Finds out why a service does not answer, by one handshake on another socket with a monitor. A
+//! client does this only when an answer is late. Its own socket has no monitor, because a monitor
+//! that is not read delays handshakes.
 
 use std::time::{Duration, Instant};
 
@@ -8,29 +8,29 @@ use zmq::SocketEvent;
 
 use crate::Identity;
 
-/// What became of a handshake.
+/// How a handshake ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Probe {
-    /// Somebody let us in.
-    LetIn,
-    /// We have proved to have our key, and the service does not let it in.
+    /// The service accepted the connection.
+    Accepted,
+    /// The service knows our key and does not admit it.
     NotAdmitted,
-    /// We come with a key and they ask for none, or the other way round.
-    OtherDoor,
-    /// Somebody is there and broke off: not who we take them for.
+    /// Only one of the two sides uses keys.
+    OtherMechanism,
+    /// The other side ended the handshake: it has not the key that we expected.
     BrokenOff,
-    /// Nothing was heard.
+    /// No answer.
     Silence,
 }
 
-/// `ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH`, for which the crate has no name.
+/// `ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH`, which the `zmq` crate does not name.
 const MECHANISM_MISMATCH: u32 = 0x1100_0002;
-/// Once may be a service that is just ending.
+/// How often the other side must end handshakes: a service that stops may end one.
 const BROKEN_OFF_MIN: usize = 2;
 
-/// Makes one handshake and tells how it went, within `patience`.
+/// Makes one handshake, for at most `patience`.
 pub(crate) fn probe(endpoint: &str, identity: Option<&Identity>, patience: Duration) -> Probe {
-    // A context of its own: whatever happens on it happens to nobody else.
+    // Its own context, so that it disturbs no other socket.
     let context = zmq::Context::new();
     watch(&context, endpoint, identity, patience).unwrap_or(Probe::Silence)
 }
@@ -76,23 +76,23 @@ fn watch(
         let frames = monitor.recv_multipart(0)?;
         match frames.first().and_then(|event| meaning(event)) {
             None => {}
-            // ZeroMQ connects again at once. It may break off before it has read what the other
-            // side is, and find that out at the next attempt: a better answer may follow.
+            // ZeroMQ connects again at once. The next attempt may show more than that the
+            // handshake was ended.
             Some(Probe::BrokenOff) => broken_off += 1,
             Some(outcome) => return Ok(outcome),
         }
     }
 }
 
-/// The first frame of an event: its number (16 bits) and its value (32 bits) as this machine
-/// writes them.
+/// Reads the first frame of a monitor's event: its number (16 bits) and its value (32 bits), in the
+/// byte order of this machine.
 fn meaning(event: &[u8]) -> Option<Probe> {
     let (number, value) = event.split_first_chunk::<2>()?;
     let value = u32::from_ne_bytes(*value.first_chunk::<4>()?);
     match (SocketEvent::from_raw(u16::from_ne_bytes(*number)), value) {
-        (SocketEvent::HANDSHAKE_SUCCEEDED, _) => Some(Probe::LetIn),
+        (SocketEvent::HANDSHAKE_SUCCEEDED, _) => Some(Probe::Accepted),
         (SocketEvent::HANDSHAKE_FAILED_AUTH, _) => Some(Probe::NotAdmitted),
-        (SocketEvent::HANDSHAKE_FAILED_PROTOCOL, MECHANISM_MISMATCH) => Some(Probe::OtherDoor),
+        (SocketEvent::HANDSHAKE_FAILED_PROTOCOL, MECHANISM_MISMATCH) => Some(Probe::OtherMechanism),
         (SocketEvent::HANDSHAKE_FAILED_PROTOCOL, _)
         | (SocketEvent::HANDSHAKE_FAILED_NO_DETAIL, _) => Some(Probe::BrokenOff),
         _ => None,

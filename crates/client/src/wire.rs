@@ -10,16 +10,16 @@ use serde::de::{DeserializeOwned, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::protocol::{
-    ArchiveAsk, Ask, Command, DoorAsk, ErrorCode, Failed, Order, PersonAsk, Query, Response,
-    ResponseMap, TenantAsk, TenantVerb,
+    ArchiveAsk, Ask, Command, ErrorCode, Failed, Order, PersonAsk, Query, Response, ResponseMap,
+    ServiceAsk, TenantAsk, TenantVerb,
 };
 
-/// What this binary speaks and understands.
+/// The version that this program writes and reads.
 pub const VERSION: u64 = 1;
 
 /// The commands that people may send, as they are spelled on the wire.
 pub const COMMANDS: [&str; 7] = Command::NAMES;
-/// Commands that come from inside the service alone.
+/// Commands that only the service itself gives. A message with one of them is refused.
 pub const INTERNAL_COMMANDS: [&str; 2] = ["open", "finish_retrain"];
 /// The queries, as they are spelled on the wire.
 pub const QUERIES: [&str; 9] =
@@ -28,22 +28,27 @@ pub const QUERIES: [&str; 9] =
 pub const ORDERS: [&str; 9] =
     ["list", "add", "admit", "retire", "rotate", "disable", "enable", "set_quotas", "erase"];
 
-/// A request as it was read.
+/// A request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
+    /// Chosen by the client. The same request with the same id is carried out once.
     pub id: RequestId,
+    /// The person in whose name it is sent.
     pub user: UserId,
+    /// What is asked.
     pub ask: Ask,
 }
 
-/// Why a message is no request. Answerable when at least its id could be read.
+/// A message that is not a request, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refused {
+    /// The id, if it could be read: only then can the message be answered.
     pub id: Option<RequestId>,
+    /// The answer.
     pub failed: Failed,
 }
 
-/// A query as it travels.
+/// A query on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum WireQuery {
@@ -91,8 +96,8 @@ impl WireQuery {
             WireQuery::Known => return Query::Known.into(),
             WireQuery::Status => return Query::Status.into(),
             WireQuery::Wait { seconds } => return Ask::Person(PersonAsk::Wait { seconds }),
-            WireQuery::Hello => return DoorAsk::Hello.into(),
-            WireQuery::Feed => return DoorAsk::Feed.into(),
+            WireQuery::Hello => return ServiceAsk::Hello.into(),
+            WireQuery::Feed => return ServiceAsk::Feed.into(),
             WireQuery::Heads { after, limit } => ArchiveAsk::Heads { after, limit },
             WireQuery::Records { stream, from, limit } => {
                 ArchiveAsk::Sealed { stream, from, limit }
@@ -119,8 +124,8 @@ struct RequestMap<'a> {
     tenant: Option<&'a TenantId>,
 }
 
-// A request is read field by field, so that each fault is named and, whatever else is wrong, the
-// refusal reaches the caller who waits for it.
+// A request is read field by field, the id first. So each fault is named, and the refusal reaches
+// the caller, who waits for it.
 #[derive(Deserialize)]
 struct IdField {
     id: RequestId,
@@ -167,7 +172,7 @@ struct OrderOf<T> {
     order: T,
 }
 
-/// The orders that are no [`Order`]: they change nothing, or no tenant.
+/// The verbs of operators that are not an [`Order`]: they change no tenant.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum OtherOrder {
@@ -215,8 +220,8 @@ pub fn encode_request(request: &Request) -> Vec<u8> {
         Ask::Person(PersonAsk::Wait { seconds }) => {
             map.query = Some(WireQuery::Wait { seconds: *seconds })
         }
-        Ask::Door(DoorAsk::Hello) => map.query = Some(WireQuery::Hello),
-        Ask::Door(DoorAsk::Feed) => map.query = Some(WireQuery::Feed),
+        Ask::Service(ServiceAsk::Hello) => map.query = Some(WireQuery::Hello),
+        Ask::Service(ServiceAsk::Feed) => map.query = Some(WireQuery::Feed),
         Ask::Archive(ask) => map.query = Some(WireQuery::of_archive(ask)),
         Ask::Order(TenantAsk { tenant, verb }) => {
             (map.order, map.tenant) = (Some(OrderField::of(verb)), tenant.as_ref());
@@ -227,12 +232,12 @@ pub fn encode_request(request: &Request) -> Vec<u8> {
 
 /// Reads a request. Unknown fields are ignored; unknown verbs are refused by name.
 ///
-/// - errors: [`Refused`], with one sentence; never panics, whatever the bytes.
+/// - errors: [`Refused`], with one sentence. No bytes make it panic.
 pub fn decode_request(bytes: &[u8]) -> Result<Request, Refused> {
     let id = unpack::<IdField>(bytes).map(|field| field.id);
     let refuse = |code, message: String| Refused {
         id: id.as_ref().ok().copied(),
-        // It may quote what a stranger sent.
+        // It may quote bytes that anybody sent.
         failed: Failed { code, message: plain::escape(&message).into_owned() },
     };
     if bytes.len() > FRAME_BYTES_MAX {
@@ -344,7 +349,7 @@ pub fn encode_response(id: RequestId, response: Response) -> Vec<u8> {
 
 /// Reads a response and the id of the request that it answers. Unknown fields are ignored.
 ///
-/// - errors: a sentence; never panics, whatever the bytes.
+/// - errors: a sentence. No bytes make it panic.
 pub fn decode_response(bytes: &[u8]) -> Result<(RequestId, Response), String> {
     let map: ResponseMap = unpack(bytes)?;
     if map.v != VERSION {
@@ -397,10 +402,10 @@ pub fn pack<T: Serialize>(value: &T) -> Vec<u8> {
 
 /// Reads one message, and nothing after it.
 ///
-/// - errors: a sentence; never panics, whatever the bytes.
+/// - errors: a sentence. No bytes make it panic.
 pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let mut decoder = rmp_serde::Deserializer::new(Cursor::new(bytes));
-    // Nested maps from a stranger must not overflow the gateway's stack.
+    // Deeply nested maps must not overflow the gateway's stack.
     decoder.set_max_depth(WIRE_DEPTH_MAX);
     let value = T::deserialize(&mut decoder).map_err(|error| error.to_string())?;
     match decoder.position() == bytes.len() as u64 {

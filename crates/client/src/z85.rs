@@ -12,7 +12,9 @@ pub fn show(key: &PublicKey) -> String {
     encode(&key.0)
 }
 
-/// Reads a public key of 40 characters.
+/// Reads a public key.
+///
+/// - returns: none if `text` is not the printed form of a key.
 pub fn read(text: &str) -> Option<PublicKey> {
     decode(text).map(PublicKey)
 }
@@ -29,8 +31,8 @@ pub(crate) fn encode(bytes: &[u8; 32]) -> String {
     text
 }
 
-/// - returns: none for another length, a character that is no digit, or five characters that stand
-///   for more than 32 bits: each key has one printed form.
+/// - returns: none for another length, for a character that is not a digit, and for five characters
+///   that mean more than 32 bits. So each key has one printed form.
 pub(crate) fn decode(text: &str) -> Option<[u8; 32]> {
     if text.len() != KEY_CHARACTERS {
         return None;

@@ -1,4 +1,4 @@
-//! One person's history, written into any store by hand: what the actor does, without actors.
+//! Writes one person's history into any store, as an actor would, without actors.
 
 use std::sync::Arc;
 
@@ -10,6 +10,7 @@ use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session};
 use apprentice::store::Store;
 use apprentice::world::{Domain, Stage};
 
+/// One person's session, and where its records are.
 pub struct Diary<D: Domain> {
     pub session: Session<D>,
     pub store: Store,
@@ -46,11 +47,14 @@ impl<D: Domain> Diary<D> {
         diary
     }
 
+    /// Decides a command, appends its records and applies them.
+    ///
+    /// - errors: the command is declined; nothing was recorded.
     pub fn give(&mut self, command: &Command) -> Result<Reply, Rejection> {
         self.decided_by(Session::propose, command)
     }
 
-    /// As older versions did it, which accepted more characters.
+    /// As [`Diary::give`], by the rules of older versions, which accepted more characters.
     pub fn give_as_of_old(&mut self, command: &Command) -> Result<Reply, Rejection> {
         self.decided_by(Session::propose_recorded, command)
     }
@@ -73,24 +77,32 @@ impl<D: Domain> Diary<D> {
         Ok(self.session.settle(&durable).unwrap())
     }
 
+    /// As [`Diary::give`].
+    ///
+    /// - panics: if the command is declined.
     pub fn accept(&mut self, command: &Command) -> Reply {
         self.give(command).unwrap_or_else(|refused| panic!("{command:?} was refused: {refused}"))
     }
 
+    /// Begins an episode with this task.
     pub fn start(&mut self, task: &str) {
         let stage = Stage::Task { task: task.to_owned(), seed: 1 };
         self.accept(&Command::StartEpisode { stage });
     }
 
+    /// Says something.
     pub fn say(&mut self, utterance: &str) -> Reply {
         self.accept(&Command::Say { utterance: utterance.to_owned() })
     }
 
+    /// Ends the episode.
     pub fn done(&mut self) {
         self.accept(&Command::Done);
     }
 
-    /// Teaches the first utterance that can still be taught. Returns the lesson's record.
+    /// Teaches the first utterance that can still be taught.
+    ///
+    /// - returns: the record of the lesson.
     pub fn teach(&mut self, actions: &[u32]) -> Seq {
         let explains = self.session.status().to_teach[0].seq;
         let (actions, on_clash) = (actions.to_vec(), OnClash::Ask);
@@ -118,6 +130,7 @@ impl<D: Domain> Diary<D> {
         mind
     }
 
+    /// All records of the person, in their order.
     pub fn records(&self) -> Vec<Record> {
         let records = self.store.log.read(&self.stream, Seq::FIRST).unwrap();
         records.map(Result::unwrap).collect()

@@ -2,14 +2,16 @@
 
 use apprentice::numerics::Rng;
 
+/// A sequence of draws.
 pub struct Dice(Rng);
 
 impl Dice {
+    /// The sequence of this seed.
     pub fn new(seed: u64) -> Dice {
         Dice(Rng::from_u64(seed))
     }
 
-    /// Below `end`, which is not 0.
+    /// Draws a number below `end`, which is at least 1.
     pub fn below(&mut self, end: usize) -> usize {
         (self.0.next_u64() % end as u64) as usize
     }
@@ -19,11 +21,13 @@ impl Dice {
         self.below(100) < percent
     }
 
+    /// Draws one of the choices.
     pub fn of<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
         &choices[self.below(choices.len())]
     }
 
-    pub fn next(&mut self) -> u64 {
+    /// Draws any number.
+    pub fn number(&mut self) -> u64 {
         self.0.next_u64()
     }
 

@@ -1,7 +1,7 @@
 //! Submits requests as a gateway does.
 
 use apprentice::actors::{AnswerTo, Front, Submit};
-use apprentice::client::{Ask, DoorAsk};
+use apprentice::client::{Ask, ServiceAsk};
 use apprentice::ids::{RequestId, TenantId, UserId};
 
 /// Counts a request for its tenant's quotas and submits it.
@@ -18,8 +18,8 @@ pub fn hand_in(
     let taken = match ask {
         Ask::Person(ask) => front.submit(Submit { tenant, user, request, ask, answer }),
         Ask::Archive(ask) => front.ask_archive(tenant, ask, answer),
-        Ask::Door(DoorAsk::Hello) => front.greet(answer),
+        Ask::Service(ServiceAsk::Hello) => front.greet(answer),
         other => panic!("a gateway answers {other:?}"),
     };
-    assert!(taken.is_ok(), "nobody else is asking");
+    assert!(taken.is_ok(), "the queue is not full");
 }

@@ -16,8 +16,8 @@ use apprentice::world::{
     Thing, View, Words, World, refuse_other_instances,
 };
 
-/// Bells ring until they are muted. Breaking a bell makes the world panic, for tests of how the
-/// service handles it. There are more such worlds: in `brittle`, training a reranker panics; in
+/// Bells ring until they are muted. Breaking a bell makes the world panic, to test how the service
+/// handles it. There are more such worlds: in `brittle`, training a reranker panics; in
 /// `slow`, it waits for a gate; `fickle` does not say the same thing twice.
 pub struct Bells {
     brittle: bool,
@@ -36,6 +36,7 @@ pub struct Gate {
 }
 
 impl Gate {
+    /// Opens the gate.
     pub fn open(&self) {
         *self.is_open.lock().unwrap() = true;
         self.changed.notify_all();
@@ -57,6 +58,7 @@ pub struct Fickle {
 /// Bells that ring.
 type Ringing = BTreeSet<Symbol>;
 
+/// The types of the bells.
 pub const BELLS: [&str; 3] = ["Brass", "Silver", "Glass"];
 
 /// A service of bells with the smallest recipe.
@@ -72,6 +74,12 @@ fn exemplars(pairs: &[(&str, &str)]) -> Vec<Exemplar> {
         program: program.parse().unwrap(),
     };
     pairs.iter().map(exemplar).collect()
+}
+
+impl Default for Bells {
+    fn default() -> Bells {
+        Bells::new()
+    }
 }
 
 impl Bells {
@@ -99,6 +107,7 @@ impl Bells {
         bells
     }
 
+    /// The usual world.
     pub fn new() -> Bells {
         let operator = |name| Operator { name: Symbol::new(name), args: vec![Symbol::new("obj")] };
         let meaning = |kind: &str| Meaning { sort: "obj".into(), kind: kind.into(), count: 1 };

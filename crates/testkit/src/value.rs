@@ -7,6 +7,7 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+/// One value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     Nil,
@@ -23,14 +24,21 @@ pub enum Value {
 }
 
 impl Value {
+    /// Reads MessagePack.
+    ///
+    /// - panics: if `bytes` are not one value.
     pub fn from_wire(bytes: &[u8]) -> Value {
         rmp_serde::from_slice(bytes).expect("the message is MessagePack")
     }
 
+    /// The value as MessagePack.
     pub fn to_wire(&self) -> Vec<u8> {
         rmp_serde::to_vec_named(self).unwrap()
     }
 
+    /// Reads the notation.
+    ///
+    /// - panics: if `text` is not in the notation.
     pub fn from_notation(text: &str) -> Value {
         serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in\n{text}"))
     }

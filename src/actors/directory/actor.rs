@@ -16,11 +16,11 @@ use crate::limits::DIRECTORY_QUEUE_MAX;
 use crate::sabotage;
 use crate::store::KeyError;
 
-/// Carries out what the [`Directory`] says.
+/// Carries out the effects of the [`Directory`].
 pub(in crate::actors) struct DirectoryActor {
     directory: Directory<Submit, ErasureAnswer>,
     people: Box<dyn People>,
-    /// Of the seats that the directory knows.
+    /// The actors of the seats that the directory knows.
     addresses: HashMap<StreamId, Address>,
     hello: Hello,
     count: Arc<AwakeCount>,
@@ -28,18 +28,21 @@ pub(in crate::actors) struct DirectoryActor {
     registrar: Registrar,
 }
 
-/// Where people's actors come from; hides the domain from the directory and from the front ends.
+/// Starts people's actors. It hides the domain from the directory and from the frontends.
 pub(in crate::actors) trait People: Send + Unpin + 'static {
-    /// - errors: when the tenant's key cannot be read.
+    /// The stream of a person.
+    ///
+    /// - errors: the tenant's key cannot be read.
     fn stream_of(&self, tenant: &TenantId, user: &UserId) -> Result<StreamId, KeyError>;
+    /// Starts an actor.
     fn wake(&self, waking: Waking) -> Address;
 }
 
-/// What a new actor is given.
+/// What a new actor gets.
 pub(in crate::actors) struct Waking {
     pub stream: StreamId,
     pub user: UserId,
-    /// Told apart from earlier actors of the same person.
+    /// Differs from that of earlier actors of the same person.
     pub generation: u64,
     pub presence: Presence,
     pub _awake: Awake,
@@ -52,12 +55,13 @@ pub(in crate::actors) struct Address {
     pub sleep: Recipient<Sleep>,
 }
 
-/// Sent to a person's actor after it was struck off the directory; its last message.
+/// The last message to a person's actor, after the directory has removed it.
 #[derive(Debug, Message)]
 #[rtype(result = "()")]
 pub(in crate::actors) struct Sleep;
 
-/// An actor asks to be struck off, because it cannot go on; the next request starts a new one.
+/// An actor asks to be removed from the directory, because it cannot continue. The next request
+/// starts a new one.
 #[derive(Debug, Message)]
 #[rtype(result = "()")]
 pub(in crate::actors) struct Leaving {
@@ -65,12 +69,12 @@ pub(in crate::actors) struct Leaving {
     pub generation: u64,
 }
 
-/// Everybody is to go to sleep, and nobody to be woken any more.
+/// Put everybody to sleep, and wake no person again.
 #[derive(Debug, Message)]
 #[rtype(result = "()")]
 pub(in crate::actors) struct SleepAll;
 
-/// Somebody asks who is there.
+/// Say which service this is.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub(in crate::actors) struct Greeting {
@@ -89,7 +93,7 @@ pub(in crate::actors) struct ErasePerson {
 /// How an erasure is answered: called once.
 pub(in crate::actors) type ErasureAnswer = Box<dyn FnOnce(Erased) + Send>;
 
-/// The erasure is over, whichever way: requests in the person's name are taken again.
+/// The erasure is over, or has failed. Requests in the person's name are accepted again.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct ErasureOver {
@@ -119,7 +123,7 @@ impl DirectoryActor {
         }
     }
 
-    /// - returns: how it ended, where the directory must know.
+    /// - returns: the result, if the directory must know it.
     fn carry_out(
         &mut self,
         effect: DirectoryEffect<Submit, ErasureAnswer>,
@@ -210,7 +214,7 @@ impl Handler<Submit> for DirectoryActor {
                 self.step(DirectoryInput::Asked(letter), ctx);
             }
             Err(error) => {
-                // Where the key stands is the operator's business.
+                // Only the operator is told where the key is.
                 tracing::error!(tenant = %submit.tenant, %error, "a tenant's key cannot be used");
                 let sentence = "this lab's key cannot be used now; an operator must look";
                 submit.answer.send(Response::error(ErrorCode::Unavailable, sentence));

@@ -1,5 +1,5 @@
-//! Erases a person. The directory waits until the person's requests and trainings are done, sends the
-//! seat to sleep and wakes no other. Then the registrar destroys the key.
+//! Erases a person. The directory waits until the person's requests and trainings are done, sends
+//! the seat to sleep and wakes no other. Then the registrar destroys the key.
 
 use std::time::Duration;
 
@@ -9,21 +9,21 @@ use crate::ids::StreamId;
 
 /// An erasure that is under way.
 pub(super) struct Erasure<E> {
-    /// What the person's seat has to do; none when they slept.
+    /// What the person's seat still has to do; none if the person was asleep.
     presence: Option<Presence>,
     /// None once the key is being destroyed.
     caller: Option<E>,
     looks: u32,
 }
 
-/// How often it is looked whether the person is idle.
+/// The time between two looks whether the person is idle.
 const LOOK: Duration = Duration::from_millis(5);
-/// How often at most: 20 seconds for requests and trainings in hand.
+/// The most looks: 20 seconds for the requests and trainings of the person.
 const LOOKS_MAX: u32 = 4_000;
 
 impl<L, E> Directory<L, E> {
     pub(super) fn erase(&mut self, stream: StreamId, caller: E) {
-        // When everybody is sent to sleep, an append may still be under way.
+        // While everybody goes to sleep, an append may still run.
         if self.stopping || self.leaving.contains_key(&stream) {
             return self.effects.push(DirectoryEffect::StillBusy { caller });
         }
@@ -33,8 +33,7 @@ impl<L, E> Directory<L, E> {
         self.look(stream);
     }
 
-    /// Goes on with an erasure when the person is idle, and gives up when they are busy for too
-    /// long.
+    /// Continues an erasure if the person is idle. Gives up if the person is busy for too long.
     pub(super) fn look(&mut self, stream: StreamId) {
         let Some(erasure) = self.leaving.get_mut(&stream) else { return };
         erasure.looks += 1;
@@ -47,7 +46,7 @@ impl<L, E> Directory<L, E> {
             self.leaving.remove(&stream);
             return self.effects.push(DirectoryEffect::StillBusy { caller });
         }
-        // Struck off first: nothing in the person's name can be appended after this.
+        // Removed first, so that nothing more is appended in the person's name.
         if let Some(generation) = self.generation_of(&stream) {
             self.strike_off(&stream, generation);
         }

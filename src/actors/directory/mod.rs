@@ -1,6 +1,6 @@
-//! Who is awake, without actix: [`Directory::step`] takes what happened and says what is to be done
-//! about it. The service does it with actix (`directory/actor.rs`), the simulator in an order that
-//! a seed decides (`tests/simulation/`).
+//! Decides who is awake, without actix: [`Directory::step`] takes an input and returns effects. The
+//! service carries them out with actix (`directory/actor.rs`), the simulator in an order that a
+//! seed decides (`tests/simulation/`).
 
 pub(super) mod actor;
 mod erasure;
@@ -13,20 +13,20 @@ use super::presence::{Attention, Presence};
 use crate::client::Response;
 use crate::ids::{StreamId, TenantId, UserId};
 
-/// Knows who is awake, wakes people when somebody asks for them, and alone puts people to sleep: a
-/// seat that stopped by itself while others hold its address would lose their messages.
+/// Knows who is awake. It wakes people when a request for them comes, and only it puts people to
+/// sleep: a seat that stopped by itself would lose the messages that are on their way to it.
 ///
-/// `L` is a request with its way back, `E` the way back of an erasure.
+/// `L` is a request that can be answered, and `E` answers an erasure.
 pub struct Directory<L, E> {
-    /// People awake at once; then the longest idle one goes to sleep.
+    /// People awake at the same time. For one more, the person who was idle longest goes to sleep.
     awake_max: usize,
-    /// Everybody was sent to sleep for good.
+    /// Everybody was put to sleep, and no person is woken again.
     stopping: bool,
-    /// People who are being erased: nobody wakes them.
+    /// People who are being erased. They are not woken.
     leaving: BTreeMap<StreamId, Erasure<E>>,
     entries: BTreeMap<StreamId, Entry>,
-    /// For each tenant with somebody awake, from the tick of the last request to whose it was: the
-    /// longest idle first.
+    /// For each tenant with people awake: these people by the tick of their last request, so the
+    /// one who was idle longest comes first.
     order: BTreeMap<TenantId, BTreeMap<u64, StreamId>>,
     ticks: u64,
     effects: Vec<DirectoryEffect<L, E>>,
@@ -38,129 +38,93 @@ struct Entry {
     tick: u64,
 }
 
-/// A request on its way to the seat of its person.
+/// A request that is to go to a person's seat.
 pub struct Letter<L> {
+    /// The person's stream.
     pub stream: StreamId,
+    /// The person's name.
     pub user: UserId,
-    /// People whom this tenant may have awake at once; none for no limit of its own.
+    /// People whom this tenant may have awake at the same time; none: it has no such quota.
     pub awake_limit: Option<u32>,
+    /// The request.
     pub content: L,
 }
 
 /// What happened to the directory.
 pub enum DirectoryInput<L, E> {
+    /// A request came.
     Asked(Letter<L>),
-    /// The end of [`DirectoryEffect::Deliver`], when it could not be delivered.
+    /// [`DirectoryEffect::Deliver`] failed.
     Undelivered(Undelivered<L>),
-    /// A seat cannot go on.
-    Leaving {
-        stream: StreamId,
-        generation: u64,
-    },
-    /// Somebody is to be erased.
-    Erase {
-        stream: StreamId,
-        caller: E,
-    },
+    /// A seat cannot continue.
+    Leaving { stream: StreamId, generation: u64 },
+    /// Erase a person.
+    Erase { stream: StreamId, caller: E },
     /// The time of [`DirectoryEffect::LookAgain`] is over.
-    Look {
-        stream: StreamId,
-    },
-    /// The end of [`DirectoryEffect::Erase`], whichever way it went.
-    Erased {
-        stream: StreamId,
-    },
-    /// Everybody is to go to sleep, and nobody to be woken any more.
+    Look { stream: StreamId },
+    /// [`DirectoryEffect::Erase`] has ended, or has failed.
+    Erased { stream: StreamId },
+    /// Put everybody to sleep, and wake no person again.
     SleepAll,
 }
 
-/// A request that came back.
+/// A request that could not be delivered.
 pub struct Undelivered<L> {
+    /// The request.
     pub letter: Letter<L>,
+    /// The seat that it was for.
     pub generation: u64,
+    /// Why it was not delivered.
     pub reason: NotDelivered,
-    /// It came back before.
+    /// This was the second attempt.
     pub again: bool,
 }
 
-/// Why a request came back.
+/// Why a request was not delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NotDelivered {
     /// The seat has too many requests waiting.
     Full,
-    /// The seat is gone, of a panic: what it was is in the log.
+    /// The seat has died of a panic. Its session is in the log.
     Closed,
 }
 
 /// What the directory wants done.
 pub enum DirectoryEffect<L, E> {
     /// Start a seat for this person.
-    Wake {
-        stream: StreamId,
-        user: UserId,
-        generation: u64,
-        presence: Presence,
-    },
-    /// Hand a request to the seat of this generation. When it cannot be:
-    /// [`DirectoryInput::Undelivered`], with the same `again`.
-    Deliver {
-        letter: Letter<L>,
-        generation: u64,
-        attention: Attention,
-        again: bool,
-    },
-    Answer {
-        content: L,
-        response: Response,
-    },
-    /// Say that this tenant has too many people awake, all of them busy.
-    RefuseWaking {
-        content: L,
-        tenant: TenantId,
-        awake: usize,
-        limit: u32,
-    },
-    /// Say that all tenants together have too many people awake, all of them busy.
-    RefuseCrowd {
-        content: L,
-        tenant: TenantId,
-    },
-    /// So many people of this tenant are awake now.
-    NoteAwake {
-        tenant: TenantId,
-        awake: usize,
-    },
-    /// Tell a seat to stop: the last message to it.
-    Sleep {
-        stream: StreamId,
-        generation: u64,
-    },
-    /// Destroy this person's key; the end is [`DirectoryInput::Erased`].
-    Erase {
-        stream: StreamId,
-        caller: E,
-    },
-    /// Say that this person is too busy to be erased.
-    StillBusy {
-        caller: E,
-    },
-    /// Hand in [`DirectoryInput::Look`] after this long.
-    LookAgain {
-        stream: StreamId,
-        after: Duration,
-    },
+    Wake { stream: StreamId, user: UserId, generation: u64, presence: Presence },
+    /// Give a request to the seat of this generation. If that fails,
+    /// [`DirectoryInput::Undelivered`] follows, with the same `again`.
+    Deliver { letter: Letter<L>, generation: u64, attention: Attention, again: bool },
+    /// Answer a request.
+    Answer { content: L, response: Response },
+    /// Answer that this tenant has too many people awake, and all of them are busy.
+    RefuseWaking { content: L, tenant: TenantId, awake: usize, limit: u32 },
+    /// Answer that all tenants together have too many people awake, and all of them are busy.
+    RefuseCrowd { content: L, tenant: TenantId },
+    /// Note how many people of this tenant are awake.
+    NoteAwake { tenant: TenantId, awake: usize },
+    /// Tell a seat to stop. This is the last message to it.
+    Sleep { stream: StreamId, generation: u64 },
+    /// Destroy this person's key. [`DirectoryInput::Erased`] follows.
+    Erase { stream: StreamId, caller: E },
+    /// Answer that this person is too busy to be erased.
+    StillBusy { caller: E },
+    /// Give [`DirectoryInput::Look`] after this time.
+    LookAgain { stream: StreamId, after: Duration },
 }
 
-/// Milliseconds after which a request that met a full queue may be sent again.
+/// Milliseconds after which a request may be sent again if the queue was full.
 const RETRY_FULL_MS: u32 = 100;
-/// Milliseconds after which a request may be sent again that met an erasure.
+/// Milliseconds after which a request may be sent again if the person is being erased.
 const RETRY_ERASURE_MS: u32 = 200;
-/// Milliseconds after which a request may be sent again whose seat died twice.
+/// Milliseconds after which a request may be sent again if its seat died twice.
 const RETRY_LOST_MS: u32 = 50;
-/// How many of the longest idle are asked whether they may sleep before a request is refused.
+/// How many people of a tenant are looked at, the longest idle first, before a request is refused.
 const SLEEPERS_TRIED_MAX: usize = 64;
 
 impl<L, E> Directory<L, E> {
+    /// A directory in which all people are asleep.
     pub fn new(awake_max: usize) -> Directory<L, E> {
         Directory {
             awake_max,
@@ -173,9 +137,9 @@ impl<L, E> Directory<L, E> {
         }
     }
 
-    /// Takes what happened.
+    /// Takes an input.
     ///
-    /// - returns: what is to be done, in this order.
+    /// - returns: the effects, in the order in which they must be carried out.
     pub fn step(&mut self, input: DirectoryInput<L, E>) -> Vec<DirectoryEffect<L, E>> {
         match input {
             DirectoryInput::Asked(letter) => self.forward(letter, false),
@@ -191,12 +155,12 @@ impl<L, E> Directory<L, E> {
         std::mem::take(&mut self.effects)
     }
 
-    /// The generation of the seat that speaks for this person; none when they sleep.
+    /// The generation of the person's seat; none if the person is asleep.
     pub fn generation_of(&self, stream: &StreamId) -> Option<u64> {
         self.entries.get(stream).map(|entry| entry.generation)
     }
 
-    /// - `again`: it came back before.
+    /// - `again`: this is the second attempt.
     fn forward(&mut self, letter: Letter<L>, again: bool) {
         if self.leaving.contains_key(&letter.stream) {
             let leaving = "this person is being erased; send it again in a moment";
@@ -235,13 +199,15 @@ impl<L, E> Directory<L, E> {
         }
     }
 
-    /// - errors: why nobody more can be awake.
+    /// Makes room for one more person.
+    ///
+    /// - errors: why there is none.
     fn make_room(&mut self, letter: &Letter<L>) -> Result<(), NoRoom> {
         if self.stopping {
             return Err(NoRoom::OfAll);
         }
         let tenant = &letter.stream.tenant;
-        // At its own limit a tenant makes room among its own people, never among others'.
+        // At its own limit, a tenant must put one of its own people to sleep.
         let awake = self.awake_of(tenant);
         if let Some(limit) = letter.awake_limit.filter(|limit| awake >= *limit as usize)
             && !self.put_to_sleep(tenant)
@@ -269,7 +235,7 @@ impl<L, E> Directory<L, E> {
         self.order.get(tenant).map_or(0, BTreeMap::len)
     }
 
-    /// When all places are taken: the tenant with the most people awake gives one of them up.
+    /// Puts one person to sleep, of the tenant with the most people awake.
     fn put_anyone_to_sleep(&mut self) -> bool {
         let mut tenants: Vec<(usize, TenantId)> =
             self.order.iter().map(|(tenant, awake)| (awake.len(), tenant.clone())).collect();
@@ -277,7 +243,9 @@ impl<L, E> Directory<L, E> {
         tenants.iter().any(|(_, tenant)| self.put_to_sleep(tenant))
     }
 
-    /// - returns: whether one of the tenant's longest idle had nothing to do and was told to sleep.
+    /// Puts the person of this tenant to sleep who was idle longest.
+    ///
+    /// - returns: false if all of those looked at are busy.
     fn put_to_sleep(&mut self, tenant: &TenantId) -> bool {
         let Some(order) = self.order.get(tenant) else { return false };
         let is_idle = |stream: &&StreamId| self.entries[*stream].presence.is_idle();
@@ -288,8 +256,8 @@ impl<L, E> Directory<L, E> {
         true
     }
 
-    /// Removes the entry first and then tells the seat to stop, so that no message can follow.
-    /// Nothing for a seat of an earlier generation.
+    /// Removes the entry and then tells the seat to stop, so that no message follows. Does nothing
+    /// for a seat of an earlier generation.
     fn strike_off(&mut self, stream: &StreamId, generation: u64) {
         if self.generation_of(stream) != Some(generation) {
             return;
@@ -333,7 +301,7 @@ impl<L, E> Directory<L, E> {
     }
 }
 
-/// Why nobody more can be awake.
+/// Why no more person can be awake.
 enum NoRoom {
     OfTenant { awake: usize, limit: u32 },
     OfAll,

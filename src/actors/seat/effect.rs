@@ -11,76 +11,78 @@ use crate::world::Domain;
 
 /// What happened to a person's seat.
 pub enum Input<D: Domain, C> {
-    /// The session was read from the log, or cannot be: then this is everybody's answer.
+    /// The session was read from the log. If that failed: the answer to all requests.
     Woken(Result<Box<Session<D>>, Box<Response>>),
-    /// Somebody asks.
+    /// A request came.
     ///
-    /// - `at`: what the wall clock read.
-    /// - `fresh`: a request id that nobody used, for the record that somebody is new.
+    /// - `at`: the time of the wall clock.
+    /// - `fresh`: an unused request id, for the record that the person is new.
     Asked { ask: PersonAsk, request: RequestId, caller: C, at: Timestamp, fresh: RequestId },
-    /// The end of [`Effect::Append`].
+    /// The result of [`Effect::Append`].
     Appended(Result<Durable, AppendError>),
-    /// The end of [`Effect::ReadBack`]: all of the records, or why they cannot be read.
+    /// The result of [`Effect::ReadBack`]: all the records, or why they cannot be read.
     ReadBack(Result<Vec<Record>, String>),
-    /// The end of [`Effect::FindMind`]; none when it is not in memory.
+    /// The result of [`Effect::FindMind`]; none if the mind is not in memory.
     Found(Option<Arc<Mind>>),
-    /// The end of [`Effect::Train`]. The mind's bytes were kept, or losing them costs time only.
+    /// The result of [`Effect::Train`].
     ///
-    /// - `recipe`: digest of the recipe that it was trained by.
-    /// - `fresh`: a request id that nobody used, for the record of it.
+    /// - `recipe`: the digest of the recipe of the training.
+    /// - `at`: the time of the wall clock.
+    /// - `fresh`: an unused request id, for the record of the result.
     Trained { recipe: Digest, outcome: Result<Arc<Mind>, String>, at: Timestamp, fresh: RequestId },
-    /// The other end of [`Effect::Train`]: there was no room for it.
+    /// [`Effect::Train`] failed, because the queue is full.
     TrainingRefused,
     /// The time of [`Effect::SetTimer`] is over.
     Due(Timer),
-    /// The directory has forgotten this seat. The last input.
+    /// The directory has removed this seat. This is the last input.
     Sleep,
 }
 
 /// What a person's seat wants done.
 pub enum Effect<D: Domain, C> {
-    /// Append to the person's stream; the end is [`Input::Appended`].
+    /// Append to the person's stream. [`Input::Appended`] follows.
     Append { after: Head, batch: Batch },
-    /// Answer a caller. Each caller is answered once.
+    /// Answer a caller. Each caller gets one answer.
     Answer { caller: C, response: Response },
-    /// Read the records of a request from the person's stream; the end is [`Input::ReadBack`].
+    /// Read the records of a request from the person's stream. [`Input::ReadBack`] follows.
     ReadBack { request: RequestId, first: Seq, last: Seq },
     /// Keep a mind in memory, where [`Effect::FindMind`] looks.
     Remember(Arc<Mind>),
-    /// Find a mind; the end is [`Input::Found`].
+    /// Find a mind. [`Input::Found`] follows.
     FindMind(Digest),
-    /// Train a mind; the end is [`Input::Trained`] or [`Input::TrainingRefused`]. Other inputs may
+    /// Train a mind. [`Input::Trained`] or [`Input::TrainingRefused`] follows; other inputs may
     /// come before it.
     Train { recipe: Arc<Recipe>, lessons: Vec<Lesson<D::Scene, D::Task>> },
-    /// Keep a snapshot of [`Seat::session`](super::Seat::session). A cache: failing costs time only.
+    /// Keep a snapshot of [`Seat::session`](super::Seat::session). It is a cache: a failure only
+    /// costs time.
     KeepSnapshot,
-    /// Drop the kept bytes of all minds but the session's. A cache, too.
+    /// Delete the kept bytes of all minds but the session's. They are a cache, too.
     ForgetOldMinds,
-    /// Have the segments closed that are due.
+    /// Let the registrar close the segments that are due.
     CloseSegments,
-    /// Tell the feed that these records are durable.
+    /// Tell the feed about these new records.
     Publish(Durable),
-    /// Hand in [`Input::Due`] after this long.
+    /// Give [`Input::Due`] after this time.
     SetTimer(Timer, Duration),
-    /// Tell the directory that this seat cannot go on.
+    /// Tell the directory that this seat cannot continue.
     Leave,
-    /// The log takes nothing more: the service ends, for this reason.
+    /// Stop the service for this reason: the log is poisoned.
     Fatal(String),
-    /// The seat is empty. The last effect.
+    /// Drop the seat. This is the last effect.
     Stop,
 }
 
-/// What a seat measures time for.
+/// What a timer of a seat is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Timer {
-    /// Somebody who waits for a training, by number.
+    /// A caller who waits for a training, by number.
     Waiter(u64),
-    /// A training that found the queue full.
+    /// A training that found the queue full, and is asked for again.
     AskForTraining,
 }
 
 impl<D: Domain, C> Input<D, C> {
-    /// Whether this is what a seat waits for that takes nothing else meanwhile.
+    /// True if the seat waits for this and takes no request before it.
     pub(super) fn ends_what_is_under_way(&self) -> bool {
         matches!(self, Input::Woken(_) | Input::Appended(_) | Input::ReadBack(_) | Input::Found(_))
     }

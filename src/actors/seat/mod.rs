@@ -1,6 +1,6 @@
-//! One person's actor without actix: no clock, no thread, no file, no entropy. [`Seat::step`] takes
-//! what happened and says what is to be done about it. The service does it with actix
-//! (`actors/user.rs`), the simulator in an order that a seed decides (`tests/simulation/`).
+//! Speaks for one person, without actix: no clock, no thread, no file, no entropy. [`Seat::step`]
+//! takes an input and returns effects. The service carries them out with actix (`actors/user.rs`),
+//! the simulator in an order that a seed decides (`tests/simulation/`).
 
 mod effect;
 mod turn;
@@ -21,19 +21,21 @@ use crate::limits::{WAIT_S_MAX, WAITERS_MAX};
 use crate::session::{Outstanding, Session};
 use crate::world::Domain;
 
-/// What a new session is opened with, the same for everybody.
+/// What the session of a new person starts with. It is the same for everybody.
 pub struct NewSession {
+    /// The recipe.
     pub recipe: Recipe,
-    /// As it is recorded.
+    /// The recipe as it is recorded.
     pub recipe_text: String,
-    /// Trained on no lesson. It holds no user's words, so all users share it.
+    /// The base mind. It contains no words of a person, so all people share it.
     pub base: Arc<Mind>,
 }
 
-/// One person, awake: the only writer of their stream. `C` is how a caller is answered.
+/// Speaks for one person who is awake, and is the only writer of the person's stream. `C` answers a
+/// caller.
 ///
-/// At most one thing is under way (an append, a reading, a search for a mind). Until its end is
-/// handed in, the seat takes nothing else.
+/// The seat does one thing at a time (an append, a reading, a search for a mind). It takes no
+/// request before the result of this thing.
 pub struct Seat<D: Domain, C> {
     stream: StreamId,
     user: UserId,
@@ -53,17 +55,17 @@ enum Stage<D: Domain> {
     /// The session is being rebuilt from the log.
     Waking,
     Awake(Box<Session<D>>),
-    /// Cannot go on. Everybody gets this answer until the directory sends the seat to sleep.
+    /// The seat cannot continue. All requests get this answer until the directory puts it to sleep.
     Leaving(Response),
 }
 
-/// How long after a refusal a training is asked for again: the trainers' queue was full.
+/// How long after a refusal a training is asked for again.
 const TRAIN_AGAIN: Duration = Duration::from_secs(1);
-/// Milliseconds after which a request may be sent again that met a seat on its way out.
+/// Milliseconds after which a request may be sent again if the seat was leaving.
 const RETRY_LEAVING_MS: u32 = 20;
 
 impl<D: Domain, C> Seat<D, C> {
-    /// A seat whose session is being read from the log: [`Input::Woken`] comes first.
+    /// A seat whose session is being read from the log. Its first input must be [`Input::Woken`].
     pub fn new(stream: StreamId, user: UserId, new: Arc<NewSession>) -> Seat<D, C> {
         Seat {
             stream,
@@ -79,7 +81,7 @@ impl<D: Domain, C> Seat<D, C> {
         }
     }
 
-    /// The session, once it was read and unless the seat is leaving.
+    /// The session; none before it was read, and none while the seat is leaving.
     pub fn session(&self) -> Option<&Session<D>> {
         match &self.stage {
             Stage::Awake(session) => Some(session),
@@ -87,22 +89,22 @@ impl<D: Domain, C> Seat<D, C> {
         }
     }
 
-    /// Whether the seat takes a new request now, rather than the end of what is under way.
+    /// True if the seat takes a request now. False: it waits for the result of an effect.
     pub fn is_ready(&self) -> bool {
         self.doing.is_none() && !matches!(self.stage, Stage::Waking)
     }
 
-    /// The callers who have no answer yet, of a seat that died.
+    /// The callers of a seat that died who have no answer yet.
     pub fn into_callers(self) -> Vec<C> {
         let doing = self.doing.and_then(Doing::into_caller);
         self.waiters.into_values().chain(doing).collect()
     }
 
-    /// Takes what happened.
+    /// Takes an input.
     ///
-    /// - returns: what is to be done, in this order.
-    /// - panics: when a new request comes while something is under way ([`Seat::is_ready`]): its
-    ///   driver has two writers (invariant `SingleWriter`).
+    /// - returns: the effects, in the order in which they must be carried out.
+    /// - panics: for a request while the seat is not ready ([`Seat::is_ready`]): then the stream
+    ///   would have two writers (invariant `SingleWriter`).
     pub fn step(&mut self, input: Input<D, C>) -> Vec<Effect<D, C>> {
         let ends = input.ends_what_is_under_way();
         assert!(
@@ -138,7 +140,7 @@ impl<D: Domain, C> Seat<D, C> {
                 let is_new = !session.is_open();
                 self.stage = Stage::Awake(session);
                 if !is_new {
-                    // What a crash kept from being closed.
+                    // A crash may have prevented this.
                     self.effects.push(Effect::CloseSegments);
                     self.ask_for_training();
                 }
@@ -196,7 +198,7 @@ impl<D: Domain, C> Seat<D, C> {
         self.effects.push(Effect::SetTimer(Timer::Waiter(self.waiters_seen), limit));
     }
 
-    /// The time of one who waits is over. Nothing when they were answered before.
+    /// The time of a waiting caller is over. Does nothing if the caller has an answer already.
     fn stop_waiting(&mut self, number: u64) {
         let Some(caller) = self.waiters.remove(&number) else { return };
         let Stage::Awake(session) = &self.stage else { return };
@@ -216,7 +218,7 @@ impl<D: Domain, C> Seat<D, C> {
     }
 
     fn sleep(&mut self) {
-        // When everybody is sent to sleep, some may still wait for a training.
+        // When everybody is put to sleep, callers may still wait for a training.
         let interrupted = "the request was interrupted; send it again";
         self.answer_waiters_with(&Response::busy(interrupted, RETRY_LEAVING_MS));
         if self.session().is_some_and(Session::is_open) {
@@ -225,13 +227,13 @@ impl<D: Domain, C> Seat<D, C> {
         self.effects.push(Effect::Stop);
     }
 
-    /// Stops in the only way that loses no message: the directory forgets this seat, and then sends
-    /// it to sleep. Requests in between are answered with busy; the next one wakes a new seat.
+    /// Asks the directory to remove this seat and to put it to sleep. In this way no message is
+    /// lost: requests until then are answered with busy, and the next request wakes a new seat.
     fn leave(&mut self) {
         self.leave_with(Response::busy("the session is read from the log again", RETRY_LEAVING_MS));
     }
 
-    /// As [`Seat::leave`], with another answer: a new seat would fare no better.
+    /// As [`Seat::leave`], with another answer.
     fn leave_with(&mut self, response: Response) {
         self.answer_waiters_with(&response);
         self.stage = Stage::Leaving(response);
@@ -244,7 +246,7 @@ impl<D: Domain, C> Seat<D, C> {
         }
     }
 
-    /// - `caller`: none for what the service itself asked.
+    /// - `caller`: none if the service itself asked.
     fn answer(&mut self, caller: Option<C>, response: Response) {
         self.effects.extend(caller.map(|caller| Effect::Answer { caller, response }));
     }

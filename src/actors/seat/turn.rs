@@ -1,4 +1,4 @@
-//! One turn: decide, append, and only then apply and answer. The only place that does it.
+//! One turn: decide, append, and only then apply and answer. No other code does this.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -18,20 +18,21 @@ use crate::world::Domain;
 pub(super) struct Work<C> {
     pub command: Command,
     pub request: RequestId,
-    /// What the wall clock read; the session makes it monotone.
+    /// The time of the wall clock. The session never goes back in time.
     pub at: Timestamp,
-    /// None for what the service itself asks.
+    /// None if the service itself asks.
     pub caller: Option<C>,
 }
 
-/// What is under way.
+/// What the seat is doing.
 pub(super) enum Doing<C> {
-    /// Recording who is new; their first command comes after it.
+    /// Recording that the person is new. The first command is decided after that.
     Opening(Work<C>, RequestId),
+    /// Recording a turn.
     Appending(Work<C>),
-    /// Reading again what answered this request id before.
+    /// Reading the records of the first answer to this request id.
     ReadingBack(Work<C>),
-    /// Finding the mind that the records name now.
+    /// Finding the mind that the records name.
     Equipping(Work<C>, Reply),
 }
 
@@ -47,22 +48,22 @@ impl<C> Doing<C> {
 impl<D: Domain, C> Seat<D, C> {
     /// Decides, and asks for the append.
     ///
-    /// - `fresh`: a request id for the record that somebody is new.
+    /// - `fresh`: an unused request id, for the record that the person is new.
     pub(super) fn perform(&mut self, work: Work<C>, fresh: RequestId) {
         let Stage::Awake(session) = &self.stage else { return };
         let is_new = !session.is_open();
         if is_new && let Err(error) = self.user.check_new() {
-            let message = format!("nobody new can be called that: {error}");
+            let message = format!("a new person cannot have this name: {error}");
             return self.answer(work.caller, Response::error(ErrorCode::Refused, message));
         }
         let at = session.next_at(work.at);
-        // Rust cannot know it, but `propose` only reads: a panic leaves the session as it was.
+        // Unwind-safe, because `propose` only reads: a panic leaves the session as it was.
         let proposed = catch_unwind(AssertUnwindSafe(|| {
             sabotage::point("handler");
             session.propose(&work.command, work.request, at)
         }));
         match proposed {
-            // What is declined makes nobody; this is the first command that is not.
+            // A person is recorded with the first command that is not declined.
             Ok(Ok(Proposed::Turn(_))) if is_new => self.open(work, fresh),
             Ok(Ok(Proposed::Turn(turn))) => self.append(turn, Doing::Appending(work)),
             Ok(Ok(Proposed::Repeat { first, last })) => {
@@ -87,7 +88,7 @@ impl<D: Domain, C> Seat<D, C> {
         self.doing = Some(doing);
     }
 
-    /// Records who is new. Their first command is decided once that is durable.
+    /// Records that the person is new. The first command is decided when that is durable.
     fn open(&mut self, first: Work<C>, fresh: RequestId) {
         let Stage::Awake(session) = &self.stage else { return };
         let command = Command::Open {
@@ -124,17 +125,17 @@ impl<D: Domain, C> Seat<D, C> {
         self.effects.push(Effect::Publish(durable));
         match settled {
             Ok(_) => {
-                tracing::info!(stream = %self.stream, "somebody new");
+                tracing::info!(stream = %self.stream, "a new person");
                 self.perform(first, fresh);
             }
             Err(divergence) => self.disagrees(first.caller, &divergence),
         }
     }
 
-    /// Makes a durable turn true.
+    /// Applies a durable turn.
     fn settle(&mut self, work: Work<C>, durable: Durable) {
         let Stage::Awake(session) = &mut self.stage else { return };
-        // A panic may leave the session half changed: it is then dropped, never used again.
+        // A panic may leave the session half changed. Then the session is not used again.
         let settled = catch_unwind(AssertUnwindSafe(|| {
             sabotage::point("settling");
             session.settle(&durable)
@@ -150,7 +151,7 @@ impl<D: Domain, C> Seat<D, C> {
         }
     }
 
-    /// Has the mind found that the session's records name, when it is another one now.
+    /// Finds the mind that the records name, if it is another one now.
     fn equip(&mut self, work: Work<C>, reply: Reply) {
         let Stage::Awake(session) = &self.stage else { return };
         if let Command::FinishRetrain { .. } = work.command {
@@ -173,7 +174,8 @@ impl<D: Domain, C> Seat<D, C> {
                 session.install(mind);
                 self.finish(work, reply);
             }
-            // Rare, the memory of minds being large. Waking again finds it in the store or trains it.
+            // Rare, because the memory of minds is large. The next waking finds it in the store or
+            // trains it.
             None => {
                 self.answer(work.caller, Response::Reply(reply));
                 self.leave();
@@ -181,7 +183,7 @@ impl<D: Domain, C> Seat<D, C> {
         }
     }
 
-    /// What is due after every turn, and the answer.
+    /// Does what is due after every turn, and answers.
     fn finish(&mut self, work: Work<C>, reply: Reply) {
         let trained = matches!(work.command, Command::FinishRetrain { .. });
         if trained {
@@ -208,12 +210,13 @@ impl<D: Domain, C> Seat<D, C> {
         self.answer_waiters_with(&Response::Waited(waited));
     }
 
-    /// The state did not change: the turn is dropped. Only when it is certain that nothing was
-    /// appended does the seat go on. Otherwise a new one reads what the log says.
+    /// The turn is dropped, and the state did not change. The seat continues only if it is certain
+    /// that nothing was appended. Otherwise a new seat reads the log.
     fn append_failed(&mut self, work: Work<C>, error: &AppendError) {
         tracing::warn!(stream = %self.stream, %error, "an append failed");
         if error.is_fatal() {
-            // Before the answer: a caller may look at once whether the service ends.
+            // Before the answer, because the caller may look at once whether the service has
+            // failed.
             self.effects.push(Effect::Fatal(error.to_string()));
         }
         let response = match error.retry_after_ms() {
@@ -228,7 +231,7 @@ impl<D: Domain, C> Seat<D, C> {
         }
     }
 
-    /// The answer to a request id that was answered before, by these records.
+    /// Answers a repeated request id from the records of the first answer.
     pub(super) fn read_back(&mut self, records: Result<Vec<Record>, String>) {
         let Some(Doing::ReadingBack(work)) = self.doing.take() else { return };
         let Stage::Awake(session) = &self.stage else { return };
@@ -239,7 +242,7 @@ impl<D: Domain, C> Seat<D, C> {
                 return self.answer(work.caller, response);
             }
         };
-        // A stage may be set once more for it, in the same code that may have panicked before.
+        // It may set up the stage again, and that code may have panicked before.
         let repeated = catch_unwind(AssertUnwindSafe(|| session.repeat(&work.command, &records)));
         let response = match repeated {
             Ok(Ok(reply)) => Response::Reply(reply),
@@ -249,7 +252,7 @@ impl<D: Domain, C> Seat<D, C> {
         self.answer(work.caller, response);
     }
 
-    /// The result of a training enters as an utterance does.
+    /// Records the result of a training, in the same way as an utterance.
     pub(super) fn trained(
         &mut self,
         recipe: Digest,
@@ -266,15 +269,15 @@ impl<D: Domain, C> Seat<D, C> {
         let command = Command::FinishRetrain { recipe, outcome };
         self.perform(Work { command, request: fresh, at, caller: None }, fresh);
         if self.doing.is_none() {
-            // Declined: another training may be due instead.
+            // It was declined. Another training may be due.
             self.ask_for_training();
         }
     }
 
-    /// The answer to a command whose events the fold refuses. Nothing was appended, and the session
-    /// did not change: it goes on.
+    /// The answer to a command whose events cannot be applied. Nothing was appended, the session
+    /// did not change, and the seat continues.
     fn cannot_be_applied(&self, session: &Session<D>, divergence: Divergence) -> Response {
-        // Both values may hold what a person said; the digest finds the state that shows it again.
+        // Both values may contain what a person said, so the log has only the digest of the state.
         let Divergence { seq, field, .. } = &divergence;
         let (stream, state) = (&self.stream, session.state_digest());
         tracing::error!(
@@ -291,7 +294,7 @@ impl<D: Domain, C> Seat<D, C> {
         )
     }
 
-    /// The records are other ones than the state expects: the seat reads them from the log.
+    /// The records contradict the state. A new seat reads them from the log.
     fn disagrees(&mut self, caller: Option<C>, divergence: &Divergence) {
         let law = divergence.law().map(tracing::field::display);
         tracing::error!(stream = %self.stream, law, %divergence, "binary and log disagree");

@@ -6,7 +6,9 @@ use crate::client::{Query, Rejected, RejectionCode, Response, Status};
 use crate::session::Session;
 use crate::world::Domain;
 
-/// - errors: what to answer when the session panicked; it is then to be left.
+/// Answers a query.
+///
+/// - errors: the answer if the session panicked. Then the session must not be used again.
 pub(super) fn answer<D: Domain>(
     new: &NewSession,
     session: &Session<D>,
@@ -27,7 +29,7 @@ pub(super) fn answer<D: Domain>(
     .map_err(|panic| Box::new(defect("looking", &*panic)))
 }
 
-/// Of a name that nothing was recorded of: what its bearer would start with.
+/// The status of a person. For a new person: what the session would start with.
 pub(super) fn status<D: Domain>(new: &NewSession, session: &Session<D>) -> Status {
     match session.is_open() {
         true => session.status(),

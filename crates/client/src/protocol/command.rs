@@ -6,30 +6,39 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
+    /// Begin an episode.
     StartEpisode {
+        /// Its scene and its task.
         stage: Stage,
     },
+    /// Say something to the robot.
     Say {
+        /// At most [`UTTERANCE_BYTES_MAX`](apprentice_core::limits::UTTERANCE_BYTES_MAX) bytes.
         utterance: String,
     },
-    /// End the episode early; it counts as abandoned.
+    /// End the episode before its goal is reached. It counts as abandoned.
     Done,
-    /// The utterance recorded at `explains` stands for these actions of the episode (counted from
-    /// 1, a contiguous run, all after the utterance). No action at all means "nothing did".
+    /// Say which actions an utterance meant.
     Teach {
+        /// The record of the answer to the utterance.
         explains: Seq,
+        /// Numbers of actions of the episode: without a gap, and all after the utterance. Empty: no
+        /// action explains it.
         actions: Vec<u32>,
+        /// What to do if the lesson contradicts a former one.
         #[serde(default)]
         on_clash: OnClash,
     },
-    /// No more teaching: train on what was taught.
+    /// End the teaching, and train on what was taught.
     FinishTeaching,
-    /// Take back the lesson recorded at `lesson`.
+    /// Forget a lesson.
     Forget {
+        /// The record of the lesson.
         lesson: Seq,
     },
-    /// Withdraw for good. The reason may be empty.
+    /// Withdraw. No command is accepted afterwards.
     Close {
+        /// May be empty.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What travels: the questions, by who answers them ([`Ask`]), and the answers ([`Response`]).
+//! What travels: requests, by who answers them ([`Ask`]), and answers ([`Response`]).
 
 mod archive;
 mod ask;
@@ -10,7 +10,7 @@ mod status;
 mod tenant;
 
 pub use archive::{Frame, HeadView, Heads, PlainRecords, PlainView, SealedRecords, SealedView};
-pub use ask::{ArchiveAsk, Ask, DoorAsk, PersonAsk, TenantAsk, TenantVerb};
+pub use ask::{ArchiveAsk, Ask, PersonAsk, ServiceAsk, TenantAsk, TenantVerb};
 pub use command::{Command, OnClash, Query};
 pub use order::Order;
 pub use reply::{Reply, Told};

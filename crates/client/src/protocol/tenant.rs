@@ -2,28 +2,32 @@ use apprentice_core::ids::{PublicKey, TenantId, Timestamp};
 use apprentice_core::tenants::{PersonErased, Quotas, Role};
 use serde::{Deserialize, Serialize};
 
-/// A person is erased.
+/// The answer to [`TenantVerb::Erase`](super::TenantVerb::Erase): the person is erased.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ErasedView {
+    /// The person's tenant.
     pub tenant: TenantId,
-    /// As it stands in the tenant's stream.
+    /// The event in the tenant's own stream, signed.
     pub erased: PersonErased,
 }
 
-/// An order was carried out, and is durable.
+/// The answer to an [`Order`](super::Order): it was carried out, and is durable.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ordered {
+    /// The tenant that it was about.
     pub tenant: TenantId,
-    /// Records that it led to; 0 when it was so already.
+    /// New records; 0 if nothing had to change.
     pub recorded: u32,
 }
 
 /// A tenant, for operators.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TenantView {
+    /// Its name.
     pub tenant: TenantId,
-    /// Why nobody comes in, if so.
+    /// Why it is disabled; none if it is not.
     pub disabled: Option<String>,
+    /// Its quotas.
     pub quotas: Quotas,
     /// Every key that was ever admitted.
     pub keys: Vec<KeyView>,
@@ -32,13 +36,17 @@ pub struct TenantView {
 /// A key, for operators.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyView {
+    /// The public half.
     pub key: PublicKey,
+    /// What its owner may ask.
     pub role: Role,
+    /// For people, such as the machine that has the key.
     pub label: String,
+    /// When it was admitted.
     pub admitted_at: Timestamp,
-    /// When its overlap was to end, once it was retired; none before.
+    /// When its overlap ends; none if it was never retired.
     pub valid_until: Option<Timestamp>,
-    /// It never comes in again: there was no overlap, or a reading of the clock has ended it.
+    /// It is never admitted again: it had no overlap, or the clock has once shown a later time.
     #[serde(default)]
     pub retired: bool,
 }
