@@ -7,7 +7,7 @@ use super::about::{About, Users};
 use super::figures::{MEASURES, task_types};
 use super::shares::{PUBLISHED, by_grammar, label};
 use super::svg::{Picture, escaped, font_faces};
-use super::tables::{SummaryRow, Tables};
+use crate::measures::{SummaryRow, Tables};
 
 /// The other measures of a summary, with the names that people read.
 const RATES: [(&str, &str); 4] = [
