@@ -21,6 +21,7 @@ pub mod evidence;
 pub mod session;
 pub mod tenancy;
 
+pub mod parallel;
 pub mod replay;
 pub mod store;
 

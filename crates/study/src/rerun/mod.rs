@@ -24,9 +24,8 @@ pub use report::{
 pub use turns::table;
 pub use walk::{Episode, Life, Taught, Turn};
 
-use crate::parallel::in_order;
 use apprentice::ids::StreamId;
-use apprentice::replay::Progress;
+use apprentice::parallel::{Progress, in_order};
 use apprentice::store::Store;
 use apprentice::world::Domain;
 use minds::BaseMinds;
