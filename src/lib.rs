@@ -25,6 +25,7 @@ pub mod store;
 pub mod session;
 pub mod tenancy;
 
+pub mod parallel;
 pub mod replay;
 
 pub mod actors;

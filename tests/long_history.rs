@@ -7,9 +7,8 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use apprentice::ids::Seq;
 use apprentice::learning::Recipe;
-use apprentice::replay::{
-    Minds, Progress, Scrutiny, audit, keep_snapshot, rebuild, rebuild_at, streams_of,
-};
+use apprentice::parallel::Progress;
+use apprentice::replay::{Minds, Scrutiny, audit, keep_snapshot, rebuild, rebuild_at, streams_of};
 use apprentice::session::Command;
 use apprentice::store::open_memory;
 use apprentice_testkit::diary::Diary;

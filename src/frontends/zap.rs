@@ -8,6 +8,8 @@
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
+use data_encoding::HEXLOWER;
+
 use super::counters::{Counters, count};
 use super::outbox::{Inbox, Outbox};
 use super::passes::Passes;
@@ -85,7 +87,7 @@ impl HandshakeSecret {
     pub fn fresh() -> HandshakeSecret {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).expect("the operating system gives random bytes");
-        HandshakeSecret(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+        HandshakeSecret(HEXLOWER.encode(&bytes))
     }
 
     fn stamp(&self, number: u64, key: &PublicKey) -> String {

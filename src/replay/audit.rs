@@ -1,13 +1,13 @@
 //! Compares the whole log with what this binary computes from it.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::Difference;
 use super::auditor::{Auditor, BaseMinds};
 use crate::ids::{Digest, StreamId, StreamKey, TenantId, UserId};
+use crate::parallel::{Progress, in_order};
 use crate::store::{ReadError, Store};
 use crate::world::Domain;
 
@@ -112,17 +112,6 @@ impl Counts {
     }
 }
 
-/// What is told of the progress of an audit.
-pub trait Progress: Sync {
-    /// So many records are to be checked in all.
-    fn expect(&self, _records: u64) {}
-    /// So many more were checked.
-    fn advance(&self, _records: u64) {}
-}
-
-/// Ignores the progress.
-impl Progress for () {}
-
 /// The streams of one tenant, or of all.
 ///
 /// - errors: the store does not say which streams it has.
@@ -136,6 +125,7 @@ pub fn streams_of(store: &Store, tenant: Option<&TenantId>) -> Result<Vec<Stream
 }
 
 /// Audits `streams`, several at once on `threads` threads; the report does not depend on how many.
+/// `progress` is told of records.
 ///
 /// One record of each is in memory at a time, and one mind.
 pub fn audit<D: Domain>(
@@ -148,21 +138,11 @@ pub fn audit<D: Domain>(
 ) -> AuditReport {
     let heads = streams.iter().map(|stream| store.log.head(stream).map_or(0, |head| head.seq));
     progress.expect(heads.sum());
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let bases = BaseMinds::default();
-    let work = || {
-        while let Some(stream) = streams.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let report = Auditor::new(domain, store, stream, scrutiny, &bases).audit(progress);
-            done.lock().unwrap_or_else(PoisonError::into_inner).push(report);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads.clamp(1, streams.len().max(1)) {
-            scope.spawn(work);
-        }
-        work();
+    // Progress counts records, which the auditors do.
+    let mut streams = in_order(threads, &(), streams, |stream| {
+        Auditor::new(domain, store, stream, scrutiny, &bases).audit(progress)
     });
-    let mut streams = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     streams.sort_by(|a: &StreamReport, b| (&a.tenant, a.stream.0).cmp(&(&b.tenant, b.stream.0)));
     let mut counts = Counts::default();
     streams.iter().for_each(|stream| counts.add(&stream.counts));

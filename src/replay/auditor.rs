@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::audit::{Counts, Progress, Scrutiny, StreamReport};
+use super::audit::{Counts, Scrutiny, StreamReport};
 use super::evidence::{SegmentError, check_segment, newest_checkpoint};
 use super::origins::mind_origin;
 use super::repropose::{self, Verdict};
@@ -13,6 +13,7 @@ use crate::events::{Event, Record, RetrainCompleted, SegmentClosed, TenantEvent,
 use crate::ids::{Digest, Seq, StreamId, UserId};
 use crate::learning::{self, Mind, Recipe};
 use crate::limits::BATCH_EVENTS_MAX;
+use crate::parallel::Progress;
 use crate::session::{Outstanding, Session, command_of};
 use crate::store::{Found, ReadError, Store};
 use crate::tenancy::Registry;

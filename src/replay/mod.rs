@@ -12,7 +12,7 @@ mod origins;
 mod rebuild;
 mod repropose;
 
-pub use audit::{AuditReport, Counts, Progress, Scrutiny, StreamReport, audit, streams_of};
+pub use audit::{AuditReport, Counts, Scrutiny, StreamReport, audit, streams_of};
 pub use difference::{Difference, body};
 pub use evidence::{
     CheckpointsError, ORIGIN, ProveError, SegmentError, Through, Wanted, check_segment,

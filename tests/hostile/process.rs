@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use apprentice::limits::SCENE_FILE_BYTES_MAX;
+use data_encoding::HEXLOWER;
 
 use crate::memory::peak_of;
 use crate::mutate::{deepest, mutate};
@@ -97,7 +98,7 @@ fn try_out(target: &Target, counts: &Counts, cases: u64, mut dice: Dice) -> Resu
             }
         };
         if let Some(what) = what {
-            let hex: String = bytes.iter().take(2_000).map(|byte| format!("{byte:02x}")).collect();
+            let hex = HEXLOWER.encode(&bytes[..bytes.len().min(2_000)]);
             return Err(format!(
                 "{}: case {case} of {} bytes {what}\n{hex}",
                 target.name,

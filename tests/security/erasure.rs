@@ -17,6 +17,7 @@ use apprentice::service::{Config, Data, Service};
 use apprentice::store;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
+use data_encoding::HEXLOWER;
 
 /// Words that nobody else says and that no file of ours contains.
 const CANARIES: [&str; 3] = ["zyxomma petiolatum", "quetzalwobble", "ada-of-the-erased"];
@@ -105,9 +106,7 @@ fn nothing_of_an_erased_person_is_left_and_everybody_else_stays() {
     let stream = stream_of(dir, CANARIES[2]);
     let wrapped = fs::read_to_string(key_file(dir, &stream)).unwrap();
     let wrapped = wrapped.lines().nth(1).unwrap().to_owned();
-    let bytes: Vec<u8> = (0..wrapped.len() / 2)
-        .map(|at| u8::from_str_radix(&wrapped[2 * at..2 * at + 2], 16).unwrap())
-        .collect();
+    let bytes = HEXLOWER.decode(wrapped.as_bytes()).unwrap();
     let mut needles: Vec<Vec<u8>> = CANARIES.iter().map(|text| text.as_bytes().to_vec()).collect();
     // The whole wrapped key, and any 16 bytes of it.
     needles.push(wrapped.clone().into_bytes());

@@ -422,6 +422,6 @@ fn forged_key(key: &str) -> String {
     let bytes = STANDARD.decode(key.trim().splitn(3, '+').nth(2).unwrap()).unwrap();
     let name = format!("x\u{1b}[8m\n{}", FORGED[1]);
     let hash = sha2::Sha256::digest([name.as_bytes(), b"\n", &bytes].concat());
-    let tag: String = hash[..4].iter().map(|byte| format!("{byte:02x}")).collect();
+    let tag = data_encoding::HEXLOWER.encode(&hash[..4]);
     format!("{name}+{tag}+{}", STANDARD.encode(bytes))
 }

@@ -1,7 +1,6 @@
 //! The progress of long work, on standard error where that is a terminal.
 
-use apprentice::replay;
-use apprentice_study as study;
+use apprentice::parallel::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub struct Bar(ProgressBar);
@@ -23,22 +22,12 @@ impl Bar {
     }
 }
 
-impl replay::Progress for Bar {
-    fn expect(&self, records: u64) {
-        self.0.inc_length(records);
+impl Progress for Bar {
+    fn expect(&self, count: u64) {
+        self.0.inc_length(count);
     }
 
-    fn advance(&self, records: u64) {
-        self.0.inc(records);
-    }
-}
-
-impl study::parallel::Progress for Bar {
-    fn expect(&self, count: usize) {
-        self.0.inc_length(count as u64);
-    }
-
-    fn advance(&self) {
-        self.0.inc(1);
+    fn advance(&self, count: u64) {
+        self.0.inc(count);
     }
 }

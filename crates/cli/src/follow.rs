@@ -9,6 +9,7 @@ use std::time::Duration;
 use apprentice::client::{Followed, Follower, Position};
 use apprentice::ids::{Seq, StreamKey, WithinTenant};
 use clap::Args;
+use data_encoding::HEXLOWER;
 use serde_json::{Value, json};
 
 use super::credentials::Credentials;
@@ -101,7 +102,7 @@ fn show(followed: &Followed, as_json: bool) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match (followed, as_json) {
         (Followed::Sealed(record), true) => {
-            let frame: String = record.frame.0.iter().map(|byte| format!("{byte:02x}")).collect();
+            let frame = HEXLOWER.encode(&record.frame.0);
             let (stream, digest) = (record.stream.to_hex(), record.digest.to_hex());
             let seq = record.seq.get();
             let line = json!({"stream": stream, "seq": seq, "digest": digest, "frame": frame});

@@ -10,6 +10,7 @@ use std::hash::{Hash, Hasher};
 use std::num::NonZeroU64;
 use std::str::FromStr;
 
+use data_encoding::{HEXLOWER, HEXLOWER_PERMISSIVE};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::limits;
@@ -275,7 +276,7 @@ macro_rules! byte_id {
         impl $name {
             /// The bytes as lower-case hexadecimal digits.
             pub fn to_hex(&self) -> String {
-                self.0.iter().map(|byte| format!("{byte:02x}")).collect()
+                HEXLOWER.encode(&self.0)
             }
         }
 
@@ -299,15 +300,8 @@ macro_rules! byte_id {
                     found: text.chars().take(80).collect(),
                     expected: $expected,
                 };
-                if text.len() != 2 * $size || !text.is_ascii() {
-                    return Err(wrong());
-                }
-                let mut bytes = [0; $size];
-                for (index, byte) in bytes.iter_mut().enumerate() {
-                    *byte = u8::from_str_radix(&text[2 * index..2 * index + 2], 16)
-                        .map_err(|_| wrong())?;
-                }
-                Ok($name(bytes))
+                let bytes = HEXLOWER_PERMISSIVE.decode(text.as_bytes()).map_err(|_| wrong())?;
+                bytes.try_into().map($name).map_err(|_| wrong())
             }
         }
 
@@ -523,6 +517,8 @@ mod tests {
         assert_eq!(id.to_hex().parse::<RequestId>().unwrap(), id);
         assert!("zz".parse::<RequestId>().is_err());
         assert!("ä".repeat(16).parse::<RequestId>().is_err());
+        assert!("+f".repeat(16).parse::<RequestId>().is_err());
+        assert_eq!("AB".repeat(16).parse::<RequestId>().unwrap(), RequestId([0xab; 16]));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use apprentice::learning::{TrainError, train};
+use apprentice::parallel::in_order;
 use apprentice::world::household::Household;
 use serde::Serialize;
 
@@ -11,7 +12,6 @@ use super::corpus::Row;
 use super::episode::{Episode, Tests, run};
 use super::failures::Failure;
 use super::figures::{Reasons, Spread};
-use super::parallel::in_order;
 use super::report::{Base, Setting};
 use super::scenes::Stages;
 use super::seeds;

@@ -18,7 +18,6 @@ pub mod known_minds;
 pub mod lessons;
 pub mod measures;
 pub mod one_shot;
-pub mod parallel;
 pub mod participant;
 pub mod people;
 pub mod pictures;

@@ -5,9 +5,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use apprentice::learning::Recipe;
+use apprentice::parallel::Progress;
 use serde::Serialize;
 
-use super::parallel::Progress;
 use super::people::People;
 use super::scenes::Staging;
 

@@ -3,6 +3,7 @@
 
 use std::fmt::{self, Write};
 
+use data_encoding::{HEXLOWER, HEXLOWER_PERMISSIVE};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -90,8 +91,7 @@ impl Value {
             Value::Double(value) => format!("{value:?}"),
             Value::Text(text) => quoted(text),
             Value::Bytes(bytes) => {
-                let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-                format!("\"0x{digits}\"")
+                format!("\"0x{}\"", HEXLOWER.encode(bytes))
             }
             Value::List(items) => {
                 let items: Vec<String> = items.iter().map(Value::flat).collect();
@@ -112,9 +112,7 @@ fn quoted(text: &str) -> String {
 }
 
 fn bytes_of(text: &str) -> Option<Vec<u8>> {
-    let digits = text.strip_prefix("0x")?;
-    let pairs = digits.as_bytes().chunks(2);
-    pairs.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok()).collect()
+    HEXLOWER_PERMISSIVE.decode(text.strip_prefix("0x")?.as_bytes()).ok()
 }
 
 impl Serialize for Value {

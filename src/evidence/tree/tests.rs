@@ -25,11 +25,7 @@ const ROOTS: [&str; 9] = [
 ];
 
 fn known() -> Vec<TreeHash> {
-    let bytes = |hex: &str| -> Vec<u8> {
-        (0..hex.len() / 2)
-            .map(|at| u8::from_str_radix(&hex[2 * at..2 * at + 2], 16).unwrap())
-            .collect()
-    };
+    let bytes = |hex: &&str| HEXLOWER.decode(hex.as_bytes()).unwrap();
     LEAVES.iter().map(|leaf| TreeHash::of_leaf(&bytes(leaf))).collect()
 }
 

@@ -132,29 +132,13 @@ fn tenants(event: &TenantEvent) -> String {
     }
 }
 
-/// `2026-01-31 12:00:00Z`.
+/// `2026-01-31 12:00:00Z`; after the year 9999 the number of microseconds since 1970.
 pub fn utc(at: Timestamp) -> String {
-    let seconds = at.0 / 1_000_000;
-    let (days, second) = (seconds / 86_400, seconds % 86_400);
-    let (year, month, day) = date(days);
-    let (hour, minute) = (second / 3_600, second / 60 % 60);
-    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{:02}Z", second % 60)
-}
-
-/// The date that is `days` after 1970-01-01, in the Gregorian calendar.
-fn date(days: u64) -> (u64, u64, u64) {
-    // Counted in years that start on 1 March, so that the leap day is the last one; 719468 days
-    // lie between 0000-03-01 and 1970-01-01, and 146097 days make 400 years.
-    let shifted = days + 719_468;
-    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
-    let leaps = day_of_era / 1_460 + day_of_era / 146_096 - day_of_era / 36_524;
-    let year_of_era = (day_of_era - leaps) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    // Months since March have 153 days for every five.
-    let month_since_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_since_march + 2) / 5 + 1;
-    let month = if month_since_march < 10 { month_since_march + 3 } else { month_since_march - 9 };
-    (400 * era + year_of_era + u64::from(month <= 2), month, day)
+    let micros = i64::try_from(at.0).unwrap_or(i64::MAX);
+    match jiff::Timestamp::from_microsecond(micros) {
+        Ok(time) => time.strftime("%Y-%m-%d %H:%M:%SZ").to_string(),
+        Err(_) => format!("{} µs after 1970", at.0),
+    }
 }
 
 #[cfg(test)]
@@ -163,10 +147,14 @@ mod tests {
 
     #[test]
     fn dates_are_those_of_the_calendar() {
-        assert_eq!(date(0), (1970, 1, 1));
-        assert_eq!(date(59), (1970, 3, 1));
-        assert_eq!(date(11_016), (2000, 2, 29));
-        assert_eq!(date(20_484), (2026, 1, 31));
-        assert_eq!(utc(Timestamp(951_827_696_000_000)), "2000-02-29 12:34:56Z");
+        for (micros, shown) in [
+            (0, "1970-01-01 00:00:00Z"),
+            (951_827_696_999_999, "2000-02-29 12:34:56Z"),
+            (1_769_860_800_000_000, "2026-01-31 12:00:00Z"),
+            (253_402_207_200_000_000, "9999-12-30 22:00:00Z"),
+            (u64::MAX, "18446744073709551615 µs after 1970"),
+        ] {
+            assert_eq!(utc(Timestamp(micros)), shown);
+        }
     }
 }

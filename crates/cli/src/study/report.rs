@@ -1,7 +1,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use apprentice_study::pictures::{About, Tables, draw};
+use apprentice_study::measures::Tables;
+use apprentice_study::pictures::{About, draw};
 use clap::Args;
 
 use crate::failure::Failure;

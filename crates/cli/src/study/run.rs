@@ -9,11 +9,11 @@ use apprentice::ids::Digest;
 use apprentice::learning::Recipe;
 use apprentice::world::household::{Household, Task};
 use apprentice_study::corpus::Corpus;
-use apprentice_study::measures::{ALL, SummaryRow};
+use apprentice_study::measures::{ALL, SummaryRow, Tables};
 use apprentice_study::participant::Teacher;
 use apprentice_study::people::People;
 use apprentice_study::run::{
-    Condition, Design, Participant, Run, RunError, Tables, TablesError, Who, recorded_people,
+    Condition, Design, MeasureError, Participant, Run, RunError, Who, make_tables, recorded_people,
     simulated_people,
 };
 use clap::Args;
@@ -152,8 +152,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     let finished = study.go();
     bar.finish();
     let finished = finished.map_err(failure)?;
-    let tables = Tables::read(&arguments.out, &design, &household, &people)
-        .and_then(|tables| tables.write(&arguments.out).map(|()| tables))
+    let tables = make_tables(&arguments.out, &design, &household, &people)
         .map_err(|error| no_tables(error, finished.episodes))?;
     let drawn = report::draw_all(&arguments.out)?;
     let report = match arguments.json {
@@ -267,7 +266,7 @@ fn failure(error: RunError) -> Failure {
     }
 }
 
-fn no_tables(error: TablesError, episodes: usize) -> Failure {
+fn no_tables(error: MeasureError, episodes: usize) -> Failure {
     Failure::failed(format!(
         "all {episodes} episodes are finished and saved, but the tables could not be made: {error}; \
          run the same command again to make them"
@@ -296,7 +295,7 @@ fn text_report(
     for condition in &design.conditions {
         let rows: Vec<&SummaryRow> = rows(tables, &condition.name).collect();
         let episodes: BTreeSet<u32> = rows.iter().map(|row| row.episode).collect();
-        let measures: BTreeSet<&str> = rows.iter().map(|row| row.measure).collect();
+        let measures: BTreeSet<&str> = rows.iter().map(|row| &*row.measure).collect();
         let _ = write!(text, "\n{:<22}", condition.name);
         episodes.iter().for_each(|episode| {
             let _ = write!(text, "{episode:>9}");

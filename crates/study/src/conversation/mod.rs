@@ -9,11 +9,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use apprentice::learning::{TrainError, train};
+use apprentice::parallel::in_order;
 use apprentice::world::household::Household;
 use serde::Serialize;
 
 use super::figures::share;
-use super::parallel::in_order;
 use super::report::Setting;
 use super::transcript::{FILE_BYTES_MAX, SyntaxError, Transcript};
 

@@ -10,6 +10,7 @@ use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Words, World};
 use serde::{Deserialize, Serialize};
 
+use crate::cells::{bit, maybe_bit, maybe_decimal, text};
 use crate::participant::{Turn, carried_out_as_meant};
 
 /// One finished episode in a participant's journal.
@@ -42,35 +43,70 @@ pub struct LifeError {
     pub reason: String,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// How an utterance was answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Heard {
+    Understood,
+    Impossible,
+    #[default]
+    NotSure,
+}
+
+impl From<&Outcome> for Heard {
+    fn from(outcome: &Outcome) -> Heard {
+        match outcome {
+            Outcome::Understood { .. } => Heard::Understood,
+            Outcome::Impossible { .. } => Heard::Impossible,
+            Outcome::NotSure => Heard::NotSure,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct UtteranceRow {
+    #[serde(with = "text")]
     pub condition: String,
+    #[serde(with = "text")]
     pub task_type: String,
+    #[serde(with = "text")]
     pub user: String,
     pub episode: u32,
     pub turn: u32,
+    #[serde(with = "text")]
     pub utterance: String,
-    pub outcome: &'static str,
+    pub outcome: Heard,
     /// Empty when nobody answered.
+    #[serde(with = "text")]
     pub answered_by: String,
+    #[serde(with = "bit")]
     pub guessed: bool,
+    #[serde(with = "text")]
     pub meant: String,
     /// None where nothing was carried out.
+    #[serde(with = "maybe_bit")]
     pub right: Option<bool>,
     pub primitives: u32,
+    #[serde(with = "bit")]
     pub taught: bool,
     /// Not because something bigger or said otherwise was not understood. No column of the table.
+    #[serde(skip)]
     pub first: bool,
     /// Of the same kind as something taught in an earlier episode. No column of the table.
+    #[serde(skip)]
     pub reuses: bool,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EpisodeRow {
+    #[serde(with = "text")]
     pub condition: String,
+    #[serde(with = "text")]
     pub task_type: String,
+    #[serde(with = "text")]
     pub user: String,
     pub episode: u32,
+    #[serde(with = "text")]
     pub goal: String,
     pub utterances: u32,
     pub understood: u32,
@@ -79,13 +115,18 @@ pub struct EpisodeRow {
     pub wrong: u32,
     pub primitives: u32,
     pub fewest_actions: Option<u32>,
+    #[serde(with = "maybe_decimal")]
     pub normalised_length: Option<f64>,
+    #[serde(with = "maybe_decimal")]
     pub complexity: Option<f64>,
     pub examples_taught: u32,
+    #[serde(with = "bit")]
     pub finished: bool,
     /// Tries of something new, and how many of them were right. No columns of the table.
+    #[serde(skip)]
     pub first_tries: (u32, u32),
     /// Requests for what was taught before, and how many were right. No columns of the table.
+    #[serde(skip)]
     pub reuses: (u32, u32),
 }
 
@@ -214,16 +255,15 @@ impl<'a> Reader<'a> {
         present.turn += 1;
         let before = present.scene.clone();
         let mut right = None;
-        let (mut outcome, mut primitives) = ("not_sure", 0);
+        let outcome = Heard::from(&event.answer.outcome);
+        let mut primitives = 0;
         let mut answered_by = String::new();
         if let Outcome::Understood { program, .. } | Outcome::Impossible { program, .. } =
             &event.answer.outcome
         {
-            outcome = "impossible";
             let parser = self.parser.ok_or("the stream has no recipe")?;
             answered_by = answerer(parser, &event.answer.evidence.answered_by);
-            if matches!(event.answer.outcome, Outcome::Understood { .. }) {
-                outcome = "understood";
+            if outcome == Heard::Understood {
                 primitives = program.steps.len() as u32;
                 for (index, step) in program.steps.iter().enumerate() {
                     let on = event.answer.chosen_for(index);
@@ -269,6 +309,7 @@ impl<'a> Reader<'a> {
         let count = |wanted: &dyn Fn(&UtteranceRow) -> bool| {
             rows.iter().filter(|row| wanted(row)).count() as u32
         };
+        let heard = |how: Heard| count(&|row| row.outcome == how);
         let right = |row: &UtteranceRow| row.right == Some(true);
         let utterances = rows.len() as u32;
         let primitives = rows.iter().map(|row| row.primitives).sum();
@@ -283,9 +324,9 @@ impl<'a> Reader<'a> {
             episode: present.entry.episode,
             goal: present.started.goal.clone(),
             utterances,
-            understood: count(&|row| row.outcome == "understood"),
-            not_sure: count(&|row| row.outcome == "not_sure"),
-            impossible: count(&|row| row.outcome == "impossible"),
+            understood: heard(Heard::Understood),
+            not_sure: heard(Heard::NotSure),
+            impossible: heard(Heard::Impossible),
             wrong: count(&|row| row.right == Some(false)),
             primitives,
             fewest_actions: fewest,

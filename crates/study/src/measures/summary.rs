@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::rows::{EpisodeRow, UtteranceRow};
+use crate::cells::{decimal, maybe_decimal, text};
 
 /// The task type of lines over all types.
 pub const ALL: &str = "all";
@@ -27,15 +30,20 @@ fn ratio(part: u32, whole: u32) -> Option<f64> {
     (whole > 0).then(|| f64::from(part) / f64::from(whole))
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SummaryRow {
+    #[serde(with = "text")]
     pub condition: String,
+    #[serde(with = "text")]
     pub task_type: String,
     pub episode: u32,
-    pub measure: &'static str,
-    pub users: usize,
+    #[serde(with = "text")]
+    pub measure: String,
+    pub users: u32,
+    #[serde(with = "decimal")]
     pub mean: f64,
     /// Divided by n - 1; none for one person.
+    #[serde(with = "maybe_decimal")]
     pub sd: Option<f64>,
 }
 
@@ -58,14 +66,14 @@ pub fn summary(episodes: &[EpisodeRow], few: impl Fn(&EpisodeRow) -> bool) -> Ve
         }
     }
     let row = |((condition, task_type, episode, measure), values): (_, Vec<f64>)| {
-        let (condition, task_type): (&str, &str) = (condition, task_type);
+        let (condition, task_type, measure): (&str, &str, &str) = (condition, task_type, measure);
         let (mean, sd) = spread(&values);
         SummaryRow {
             condition: condition.to_owned(),
             task_type: task_type.to_owned(),
             episode,
-            measure,
-            users: values.len(),
+            measure: measure.to_owned(),
+            users: values.len() as u32,
             mean,
             sd,
         }
@@ -81,28 +89,31 @@ fn spread(values: &[f64]) -> (f64, Option<f64>) {
     (mean, (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt()))
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AnsweredRow {
+    #[serde(with = "text")]
     pub condition: String,
+    #[serde(with = "text")]
     pub answered_by: String,
-    pub parses: usize,
+    pub parses: u32,
     /// Of the condition's parses.
+    #[serde(with = "decimal")]
     pub share: f64,
 }
 
 /// Who gave how many of the programs, carried out or impossible.
 pub fn answered(utterances: &[UtteranceRow]) -> Vec<AnsweredRow> {
-    let mut counts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
-    let mut all: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut counts: BTreeMap<(&str, &str), u32> = BTreeMap::new();
+    let mut all: BTreeMap<&str, u32> = BTreeMap::new();
     for row in utterances.iter().filter(|row| !row.answered_by.is_empty()) {
         *counts.entry((&row.condition, &row.answered_by)).or_default() += 1;
         *all.entry(&row.condition).or_default() += 1;
     }
-    let row = |((condition, answered_by), parses): ((&str, &str), usize)| AnsweredRow {
+    let row = |((condition, answered_by), parses): ((&str, &str), u32)| AnsweredRow {
         condition: condition.to_owned(),
         answered_by: answered_by.to_owned(),
         parses,
-        share: parses as f64 / all[condition] as f64,
+        share: f64::from(parses) / f64::from(all[condition]),
     };
     counts.into_iter().map(row).collect()
 }
@@ -158,6 +169,10 @@ mod tests {
         // Nobody tried anything new, and nobody could re-use anything.
         assert_eq!(find(ALL, "understood_first_try"), None);
         assert_eq!(find(ALL, "reuse_rate"), None);
-        assert!(rows.is_sorted_by_key(|row| (row.task_type.clone(), row.episode, row.measure)));
+        assert!(rows.is_sorted_by_key(|row| (
+            row.task_type.clone(),
+            row.episode,
+            row.measure.clone()
+        )));
     }
 }

@@ -9,12 +9,7 @@ use super::chart::{BARS_MAX, Chart, Curve, Frame, Point};
 use super::scale::Scale;
 use super::style::{INK, SOFT, look};
 use super::svg::Picture;
-use super::tables::Tables;
-
-/// The task type of rows over all types.
-const ALL: &str = "all";
-/// Recorded people with few episodes are reported apart and in no figure.
-const FEW: &str = "under_5_episodes";
+use crate::measures::{ALL, FEW, Tables};
 
 /// A measure as it is drawn.
 pub(super) struct Measure {

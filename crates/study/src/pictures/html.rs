@@ -1,13 +1,15 @@
 //! The report: one file with everything in it, readable without scripts and on paper.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
+
+use apprentice::plain;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::about::{About, Users};
 use super::figures::{MEASURES, task_types};
 use super::shares::{PUBLISHED, by_grammar, label};
-use super::svg::{Picture, escaped, font_faces};
-use super::tables::{SummaryRow, Tables};
+use super::svg::{Picture, font_faces};
+use crate::measures::{ALL, FEW, SummaryRow, Tables};
 
 /// The other measures of a summary, with the names that people read.
 const RATES: [(&str, &str); 4] = [
@@ -43,40 +45,51 @@ dt{color:#595959}dd{margin:0;overflow-wrap:anywhere}
 ";
 
 pub(super) fn page(tables: &Tables, about: &About, pictures: &[Picture]) -> String {
-    let mut out = String::new();
     let title = match about.is_simulated() {
         true => "A study with simulated users",
         false => "A study with recorded people",
     };
-    let _ = write!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>{}\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
-         <h1>{title}</h1>\n",
-        font_faces()
-    );
-    out.push_str(&who(about));
-    out.push_str(&what_was_run(tables, about));
-    out.push_str("<h2 id=\"figures\">Figures</h2>\n");
-    for picture in pictures {
-        let _ = write!(
-            out,
-            "<figure id=\"{}\">\n{}<figcaption>{}. {}</figcaption>\n</figure>\n",
-            picture.name,
-            picture.inline(),
-            escaped(&picture.title),
-            escaped(&about.participants())
-        );
-    }
-    out.push_str("<h2 id=\"tables\">Tables</h2>\n");
-    out.push_str(&measures(tables, about));
-    out.push_str(&grammar(tables, about));
-    out.push_str("</main>\n</body>\n</html>\n");
-    out
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(font_faces())) (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    h1 { (title) }
+                    (who(about))
+                    (what_was_run(tables, about))
+                    h2 id="figures" { "Figures" }
+                    @for picture in pictures { (figure(picture, about)) }
+                    h2 id="tables" { "Tables" }
+                    (measures(tables, about))
+                    (grammar(tables, about))
+                }
+            }
+        }
+    };
+    page.into_string() + "\n"
 }
 
-fn who(about: &About) -> String {
+/// A text that somebody else chose: no character of it is hidden.
+fn shown(text: &str) -> Markup {
+    html! { (plain::escape_lines(text)) }
+}
+
+fn figure(picture: &Picture, about: &About) -> Markup {
+    html! {
+        figure id=(picture.name) {
+            (PreEscaped(picture.inline()))
+            figcaption { (shown(&picture.title)) ". " (shown(&about.participants())) }
+        }
+    }
+}
+
+fn who(about: &About) -> Markup {
     let (class, more) = match about.is_simulated() {
         true => (
             "who",
@@ -89,94 +102,77 @@ fn who(about: &About) -> String {
              fallback to primitives was played by a program.",
         ),
     };
-    format!("<p class=\"{class}\"><strong>{}</strong> {more}</p>\n", escaped(&about.participants()))
+    html! { p class=(class) { strong { (shown(&about.participants())) } " " (more) } }
 }
 
-fn what_was_run(tables: &Tables, about: &About) -> String {
-    let mut out = String::from("<h2 id=\"run\">What was run</h2>\n<dl>\n");
-    let mut line = |name: &str, value: &str| {
-        let _ = writeln!(out, "<dt>{name}</dt><dd>{}</dd>", escaped(value));
-    };
-    line("Program", &about.program);
-    line("Seed", &about.seed.to_string());
+fn what_was_run(tables: &Tables, about: &About) -> Markup {
+    let mut lines = vec![("Program", about.program.clone()), ("Seed", about.seed.to_string())];
     for condition in &about.conditions {
-        line("Condition", &format!("{}, recipe {}", condition.name, condition.recipe));
+        lines.push(("Condition", format!("{}, recipe {}", condition.name, condition.recipe)));
     }
-    match &about.users {
+    lines.push(match &about.users {
         Users::SimulatedPerType { task_types, .. } | Users::Simulated { task_types, .. } => {
-            line("Task types", &task_types.join(", "));
+            ("Task types", task_types.join(", "))
         }
         Users::Recorded { corpus, people, .. } => {
-            line("Corpus", &format!("SHA-256 or digest {corpus}; people: {people}"));
+            ("Corpus", format!("SHA-256 or digest {corpus}; people: {people}"))
         }
-    }
+    });
     let people: BTreeSet<(&str, &str)> =
         tables.episodes.iter().map(|row| (row.condition.as_str(), row.user.as_str())).collect();
     let finished = tables.episodes.iter().filter(|row| row.finished).count();
-    line(
-        "Size",
-        &format!(
-            "{} people × conditions, {} episodes ({finished} reached their goal), {} utterances",
-            people.len(),
-            tables.episodes.len(),
-            tables.utterances.len()
-        ),
+    let size = format!(
+        "{} people × conditions, {} episodes ({finished} reached their goal), {} utterances",
+        people.len(),
+        tables.episodes.len(),
+        tables.utterances.len()
     );
-    let _ = write!(
-        out,
-        "</dl>\n<p>The command that made it:</p>\n<pre>{}</pre>\n",
-        escaped(&about.command())
-    );
-    out
+    lines.push(("Size", size));
+    html! {
+        h2 id="run" { "What was run" }
+        dl {
+            @for (name, value) in &lines { dt { (name) } dd { (shown(value)) } }
+        }
+        p { "The command that made it:" }
+        pre { (shown(&about.command())) }
+    }
 }
 
 /// A table for each measure over all types, and one for each task type below it.
-fn measures(tables: &Tables, about: &About) -> String {
-    let mut out = String::new();
-    let few = "under_5_episodes";
-    for measure in &MEASURES {
-        let caption = format!("{}: {}; mean ± standard deviation", measure.title, measure.unit);
-        let all = table(tables, about, "all", measure.key, &caption, 2);
-        let kinds: Vec<String> = task_types(tables)
-            .iter()
-            .map(|kind| {
-                let caption = format!("{}: task type {kind}", measure.title);
-                table(tables, about, kind, measure.key, &caption, 2)
-            })
-            .collect();
-        let _ = write!(out, "<h3>{}</h3>\n{all}", escaped(measure.title));
-        if kinds.iter().any(|table| !table.is_empty()) {
-            let _ = write!(
-                out,
-                "<details>\n<summary>By task type</summary>\n{}</details>\n",
-                kinds.concat()
-            );
+fn measures(tables: &Tables, about: &About) -> Markup {
+    let of = |task_type: &str, key: &str, caption: &str, places: usize| {
+        table(tables, about, task_type, key, caption, places)
+    };
+    let kinds = task_types(tables);
+    let names = MEASURES.iter().map(|measure| (measure.key, measure.title)).chain(RATES);
+    let apart: Vec<Markup> = names.filter_map(|(key, title)| of(FEW, key, title, 3)).collect();
+    html! {
+        @for measure in &MEASURES {
+            @let caption = format!("{}: {}; mean ± standard deviation", measure.title, measure.unit);
+            @let kinds: Vec<Markup> = kinds.iter().filter_map(|kind| {
+                of(kind, measure.key, &format!("{}: task type {kind}", measure.title), 2)
+            }).collect();
+            h3 { (measure.title) }
+            @if let Some(all) = of(ALL, measure.key, &caption, 2) { (all) }
+            @if !kinds.is_empty() {
+                details { summary { "By task type" } @for table in kinds { (table) } }
+            }
+        }
+        @for (key, title) in RATES {
+            @if let Some(all) = of(ALL, key, &format!("{title}; shares"), 3) {
+                h3 { (title) }
+                (all)
+            }
+        }
+        @if !apart.is_empty() {
+            h3 { "People with fewer than 5 episodes" }
+            p { "They are in no figure and no table above." }
+            @for table in apart { (table) }
         }
     }
-    for (key, title) in RATES {
-        let all = table(tables, about, "all", key, &format!("{title}; shares"), 3);
-        if !all.is_empty() {
-            let _ = write!(out, "<h3>{title}</h3>\n{all}");
-        }
-    }
-    let apart: Vec<String> = MEASURES
-        .iter()
-        .map(|measure| (measure.key, measure.title))
-        .chain(RATES)
-        .map(|(key, title)| table(tables, about, few, key, title, 3))
-        .collect();
-    if apart.iter().any(|table| !table.is_empty()) {
-        let _ = write!(
-            out,
-            "<h3>People with fewer than 5 episodes</h3>\n<p>They are in no figure and no table \
-             above.</p>\n{}",
-            apart.concat()
-        );
-    }
-    out
 }
 
-/// Conditions by episodes; empty where there is no row.
+/// Conditions by episodes; none where there is no row.
 fn table(
     tables: &Tables,
     about: &About,
@@ -184,7 +180,7 @@ fn table(
     measure: &str,
     caption: &str,
     places: usize,
-) -> String {
+) -> Option<Markup> {
     let rows = tables.summary.iter();
     let rows: Vec<&SummaryRow> =
         rows.filter(|row| row.task_type == task_type && row.measure == measure).collect();
@@ -194,65 +190,69 @@ fn table(
         let key = (about.rank(&row.condition), row.condition.as_str());
         conditions.entry(key).or_default().insert(row.episode, row);
     }
-    if rows.is_empty() {
-        return String::new();
-    }
-    let mut out = format!(
-        "<div class=\"wide\"><table>\n<caption>{}</caption>\n<thead><tr>\
-         <th scope=\"col\">condition</th><th scope=\"col\">users</th>",
-        escaped(caption)
-    );
-    for episode in &episodes {
-        let _ = write!(out, "<th scope=\"col\">episode {episode}</th>");
-    }
-    out.push_str("</tr></thead>\n<tbody>\n");
-    for ((_, condition), by_episode) in &conditions {
-        let users: BTreeSet<u32> = by_episode.values().map(|row| row.users).collect();
-        let users = match (users.first(), users.last()) {
-            (Some(low), Some(high)) if low != high => format!("{low}–{high}"),
-            (Some(one), _) => one.to_string(),
-            _ => String::new(),
-        };
-        let _ = write!(out, "<tr><th scope=\"row\">{}</th><td>{users}</td>", escaped(condition));
-        for episode in &episodes {
-            match by_episode.get(episode) {
-                Some(SummaryRow { mean, sd: Some(sd), .. }) => {
-                    let _ = write!(
-                        out,
-                        "<td>{mean:.places$} <span class=\"soft\">± {sd:.places$}</span></td>"
-                    );
+    let table = html! {
+        div class="wide" {
+            table {
+                caption { (shown(caption)) }
+                thead {
+                    tr {
+                        th scope="col" { "condition" }
+                        th scope="col" { "users" }
+                        @for episode in &episodes { th scope="col" { "episode " (episode) } }
+                    }
                 }
-                Some(SummaryRow { mean, sd: None, .. }) => {
-                    let _ = write!(out, "<td>{mean:.places$}</td>");
+                tbody {
+                    @for ((_, condition), by_episode) in &conditions {
+                        tr {
+                            th scope="row" { (shown(condition)) }
+                            td { (users(by_episode)) }
+                            @for episode in &episodes {
+                                td { (cell(by_episode.get(episode).copied(), places)) }
+                            }
+                        }
+                    }
                 }
-                None => out.push_str("<td>–</td>"),
             }
         }
-        out.push_str("</tr>\n");
-    }
-    out.push_str("</tbody>\n</table></div>\n");
-    out
+    };
+    (!rows.is_empty()).then_some(table)
 }
 
-fn grammar(tables: &Tables, about: &About) -> String {
+fn users(by_episode: &BTreeMap<u32, &SummaryRow>) -> String {
+    let users: BTreeSet<u32> = by_episode.values().map(|row| row.users).collect();
+    match (users.first(), users.last()) {
+        (Some(low), Some(high)) if low != high => format!("{low}–{high}"),
+        (Some(one), _) => one.to_string(),
+        _ => String::new(),
+    }
+}
+
+fn cell(row: Option<&SummaryRow>, places: usize) -> Markup {
+    let Some(SummaryRow { mean, sd, .. }) = row else { return html! { "–" } };
+    html! {
+        (format!("{mean:.places$}"))
+        @if let Some(sd) = sd { " " span class="soft" { (format!("± {sd:.places$}")) } }
+    }
+}
+
+fn grammar(tables: &Tables, about: &About) -> Markup {
     let found = by_grammar(tables, about);
     if found.is_empty() {
-        return String::new();
+        return html! {};
     }
-    let mut out = String::from(
-        "<h3>Parses that the grammar answered</h3>\n<div class=\"wide\"><table>\n\
-         <caption>Of all parses that led to a program</caption>\n<thead><tr>\
-         <th scope=\"col\">who</th><th scope=\"col\">by the grammar</th></tr></thead>\n<tbody>\n",
-    );
     let published = ("the paper, people (published)".to_owned(), PUBLISHED.0, PUBLISHED.1);
-    for (name, by, all) in std::iter::once(published).chain(found) {
-        let _ = writeln!(
-            out,
-            "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
-            escaped(&name),
-            label(by, all)
-        );
+    html! {
+        h3 { "Parses that the grammar answered" }
+        div class="wide" {
+            table {
+                caption { "Of all parses that led to a program" }
+                thead { tr { th scope="col" { "who" } th scope="col" { "by the grammar" } } }
+                tbody {
+                    @for (name, by, all) in std::iter::once(published).chain(found) {
+                        tr { th scope="row" { (shown(&name)) } td { (label(by, all)) } }
+                    }
+                }
+            }
+        }
     }
-    out.push_str("</tbody>\n</table></div>\n");
-    out
 }

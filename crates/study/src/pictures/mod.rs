@@ -13,7 +13,6 @@ mod scale;
 mod shares;
 mod style;
 mod svg;
-mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -22,7 +21,8 @@ use std::path::{Path, PathBuf};
 
 pub use about::{About, AboutError, Condition, Users};
 pub use svg::Picture;
-pub use tables::{AnsweredRow, EpisodeRow, SummaryRow, Tables, TablesError, UtteranceRow};
+
+use crate::measures::Tables;
 
 /// The report's file in a study's directory.
 pub const REPORT_FILE: &str = "report.html";

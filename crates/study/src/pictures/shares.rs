@@ -8,7 +8,7 @@ use super::about::About;
 use super::canvas::{Canvas, Hand, Side, WIDTH, width_of};
 use super::style::{INK, LOOKS, SOFT};
 use super::svg::Picture;
-use super::tables::Tables;
+use crate::measures::Tables;
 
 /// Parses of the paper's baseline that its grammar answered, and all of them (the paper, section 4).
 pub(super) const PUBLISHED: (u32, u32) = (713, 793);

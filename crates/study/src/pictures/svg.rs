@@ -3,6 +3,7 @@
 use apprentice::plain;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use maud::html;
 
 use super::canvas::FONT;
 use super::style::{CURVE_WIDTH, LOOKS, hex};
@@ -89,20 +90,8 @@ pub fn font_faces() -> String {
 }
 
 /// Text between tags or in quotes.
-pub fn escaped(text: &str) -> String {
-    let text = plain::escape_lines(text);
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c => out.push(c),
-        }
-    }
-    out
+fn escaped(text: &str) -> String {
+    html! { (plain::escape_lines(text)) }.into_string()
 }
 
 /// Width and height as the root says them.

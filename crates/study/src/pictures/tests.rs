@@ -3,8 +3,8 @@
 use resvg::usvg::roxmltree::{Document, Node};
 
 use super::style::{CURVE_WIDTH, LOOKS, hex, look};
-use super::tables::rows;
 use super::*;
+use crate::cells;
 
 const TASK_TYPES: [&str; 2] = ["clean", "pick_cool_then_place"];
 const CONDITIONS: [&str; 3] = ["paper", "default", "seq2seq-grammar"];
@@ -52,9 +52,8 @@ fn tables() -> Tables {
         }
     }
     Tables {
-        summary: rows("summary.csv", &text).unwrap(),
-        answered: rows(
-            "answered.csv",
+        summary: cells::read(&text).unwrap(),
+        answered: cells::read(
             "condition,answered_by,parses,share\nseq2seq-grammar,grammar,30,0.7500\n\
              seq2seq-grammar,model,10,0.2500\npaper,exemplar,20,1.0000\n",
         )

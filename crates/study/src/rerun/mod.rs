@@ -5,28 +5,27 @@
 //! other configuration would have met, and figures say which turns they count.
 
 mod configuration;
-mod csv;
 mod minds;
 mod report;
 #[cfg(test)]
 mod tests;
 mod text;
+mod turns;
 mod walk;
 
 use std::sync::Arc;
 
 pub use configuration::{Other, SWEEP_MAX, Variant, With, WithError};
-pub use csv::table;
 pub use minds::MindCounts;
 pub use report::{
     Change, Difference, EpisodeFigures, EpisodeReport, Examples, Figures, LeftOut, PersonReport,
     Report, Side, VariantReport,
 };
+pub use turns::table;
 pub use walk::{Episode, Life, Taught, Turn};
 
-use crate::parallel::in_order;
 use apprentice::ids::StreamId;
-use apprentice::replay::Progress;
+use apprentice::parallel::{Progress, in_order};
 use apprentice::store::Store;
 use apprentice::world::Domain;
 use minds::BaseMinds;

@@ -6,7 +6,7 @@ use apprentice::events::{Event, Interpreted, Record};
 use apprentice::grounding::Moment;
 use apprentice::ids::{Seq, StreamId, TenantId, UserId};
 use apprentice::language::{Answer, Outcome, Symbol};
-use apprentice::replay::Progress;
+use apprentice::parallel::Progress;
 use apprentice::session::Session;
 use apprentice::store::{ReadError, Store};
 use apprentice::world::Domain;

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use apprentice::client::Client;
 use apprentice::ids::UserId;
+use apprentice::parallel::{Progress, in_order};
 use apprentice::service::{Config, Data, Service, StartError};
 use apprentice::store::OpenError;
 use apprentice::world::household::Household;
@@ -19,7 +20,6 @@ use super::design::{Condition, Design, STUDY_FILE, data_dir, difference};
 use super::journal::{Journal, Line};
 use super::people::{Participant, Planned};
 use crate::measures::Entry;
-use crate::parallel::Progress;
 use crate::participant::{
     Person, RecordedEpisode, SimulatedEpisode, TalkError, Turn, Wire, speak, teach,
 };
@@ -90,7 +90,7 @@ impl Run<'_> {
     pub fn go(&self) -> Result<Finished, RunError> {
         self.prepare()?;
         let each: usize = self.people.iter().map(|person| person.episodes.len()).sum();
-        self.progress.expect(each * self.design.conditions.len());
+        self.progress.expect((each * self.design.conditions.len()) as u64);
         let done = AtomicUsize::new(0);
         let mut before = 0;
         for condition in &self.design.conditions {
@@ -138,7 +138,7 @@ impl Run<'_> {
             let journal = Journal::open(self.out, &condition.name, person.number)
                 .map_err(|error| stopped("the journals cannot be read", error.to_string()))?;
             let lines = journal.lines().len().min(person.episodes.len());
-            (0..lines).for_each(|_| self.progress.advance());
+            self.progress.advance(lines as u64);
             before += lines;
             if lines < person.episodes.len() {
                 unfinished.push((person, journal));
@@ -153,29 +153,18 @@ impl Run<'_> {
             error: Box::new(error),
             state: self.state(done),
         })?;
-        let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let stop = AtomicBool::new(false);
         let people: Vec<Mutex<(&Participant, Journal)>> =
             unfinished.into_iter().map(Mutex::new).collect();
-        let worker = || -> Result<(), (String, String)> {
-            while !stop.load(Ordering::Relaxed) {
-                let Some(person) = people.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                let mut person = person.lock().expect("each person has one worker");
-                let (participant, journal) = &mut *person;
-                let lived = self.live(condition, &service, participant, journal, done, &stop);
-                if let Err(failed) = lived {
-                    stop.store(true, Ordering::Relaxed);
-                    return Err(failed);
-                }
+        let results = in_order(self.workers, &(), &people, |person| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
             }
-            Ok(())
-        };
-        let results: Vec<_> = thread::scope(|scope| {
-            let workers: Vec<_> = (0..self.workers.max(1)).map(|_| scope.spawn(worker)).collect();
-            let join = |worker: thread::ScopedJoinHandle<'_, _>| match worker.join() {
-                Ok(result) => result,
-                Err(panic) => std::panic::resume_unwind(panic),
-            };
-            workers.into_iter().map(join).collect()
+            let mut person = person.lock().expect("each person has one worker");
+            let (participant, journal) = &mut *person;
+            let lived = self.live(condition, &service, participant, journal, done, &stop);
+            stop.fetch_or(lived.is_err(), Ordering::Relaxed);
+            lived
         });
         let ended = service.stop();
         // What the service says of itself explains what its clients met.
@@ -250,7 +239,7 @@ impl Run<'_> {
                 )
             })?;
             done.fetch_add(1, Ordering::Relaxed);
-            self.progress.advance();
+            self.progress.advance(1);
         }
         Ok(())
     }

@@ -11,4 +11,4 @@ mod tables;
 pub use design::{Condition, Design, Who};
 pub use driver::{Finished, Run, RunError, State};
 pub use people::{Participant, PeopleError, Recorded, recorded_people, simulated_people};
-pub use tables::{Tables, TablesError};
+pub use tables::{MeasureError, make_tables};

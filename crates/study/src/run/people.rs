@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use apprentice::language::{Program, Step, Utterance};
+use apprentice::parallel::in_order;
 use apprentice::world::household::{Household, Kind, Room, Scene, Task};
 use apprentice::world::{Stage, World};
 
 use super::scene_text::scene_file;
 use crate::corpus::{Corpus, Row};
 use crate::draw;
-use crate::parallel::in_order;
 use crate::participant::Said;
 use crate::scenes::{Clashes, Stages};
 

@@ -3,18 +3,16 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Told how far an evaluation is; the evaluation never asks it anything.
+/// Told how far some work is; the work never asks it anything.
 pub trait Progress: Sync {
     /// So many more pieces of work will be done.
-    fn expect(&self, count: usize);
-    fn advance(&self);
+    fn expect(&self, _count: u64) {}
+    /// So many more are done.
+    fn advance(&self, _count: u64) {}
 }
 
 /// Nobody watches.
-impl Progress for () {
-    fn expect(&self, _: usize) {}
-    fn advance(&self) {}
-}
+impl Progress for () {}
 
 /// `work` applied to every item, on at most `threads` threads; the results come in the order of
 /// the items, whoever was faster.
@@ -24,7 +22,7 @@ pub fn in_order<T: Sync, R: Send>(
     items: &[T],
     work: impl Fn(&T) -> R + Sync,
 ) -> Vec<R> {
-    progress.expect(items.len());
+    progress.expect(items.len() as u64);
     let next = AtomicUsize::new(0);
     let one_thread = || {
         let mut done = Vec::new();
@@ -32,11 +30,12 @@ pub fn in_order<T: Sync, R: Send>(
             let place = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = items.get(place) else { return done };
             done.push((place, work(item)));
-            progress.advance();
+            progress.advance(1);
         }
     };
     let mut done: Vec<(usize, R)> = thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(one_thread)).collect();
+        let threads = threads.clamp(1, items.len().max(1));
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(one_thread)).collect();
         let join = |worker: thread::ScopedJoinHandle<'_, Vec<(usize, R)>>| match worker.join() {
             Ok(done) => done,
             Err(panic) => std::panic::resume_unwind(panic),
