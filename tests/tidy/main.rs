@@ -100,7 +100,8 @@ fn arrows_in_the_store() -> BTreeMap<String, BTreeSet<String>> {
         };
         let parts: Vec<&str> = below.trim_end_matches(".rs").split('/').collect();
         let unit = parts[0];
-        let of_store = source.paths.iter().filter(|path| path.len() > 2 && path[1] == "store");
+        let of_store =
+            source.paths.iter().filter(|path| path.len() > 2 && path[..2] == ["crate", "store"]);
         let named: BTreeSet<String> = of_store.map(|path| path[2].clone()).collect();
         for name in &named {
             let fine = place_of(&format!("store/{name}")).is_some();
