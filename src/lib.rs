@@ -9,7 +9,7 @@
 
 pub use apprentice_client as client;
 pub use apprentice_core::{fairness, ids, invariants, language, limits, numerics, plain, sabotage};
-pub use apprentice_mind::{grounding, learning, parser};
+pub use apprentice_mind::{dialogue, grounding, learning, parser};
 
 /// Where programs run: the trait of a world, and the worlds that exist.
 pub mod world {

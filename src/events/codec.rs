@@ -36,6 +36,7 @@ pub fn encode(event: &Event) -> Vec<u8> {
         Event::RetrainCompleted(body) => pack(body),
         Event::RetrainFailed(body) => pack(body),
         Event::SessionClosed(body) => pack(body),
+        Event::MarkedWrong(body) => pack(body),
         Event::Tenant(event) => pack(event),
     }
 }
@@ -61,6 +62,7 @@ pub fn decode(kind: u16, version: u16, body: &[u8]) -> Result<Event, DecodeError
         EventKind::RetrainCompleted => Event::RetrainCompleted(unpack(kind, body)?),
         EventKind::RetrainFailed => Event::RetrainFailed(unpack(kind, body)?),
         EventKind::SessionClosed => Event::SessionClosed(unpack(kind, body)?),
+        EventKind::MarkedWrong => Event::MarkedWrong(unpack(kind, body)?),
         EventKind::TenantOpened => unpack::<TenantOpened>(kind, body)?.into(),
         EventKind::KeyAdmitted => unpack::<KeyAdmitted>(kind, body)?.into(),
         EventKind::KeyRetired => unpack::<KeyRetired>(kind, body)?.into(),

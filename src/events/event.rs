@@ -20,6 +20,7 @@ pub enum Event {
     RetrainCompleted(RetrainCompleted),
     RetrainFailed(RetrainFailed),
     SessionClosed(SessionClosed),
+    MarkedWrong(MarkedWrong),
     /// Of the tenant's own stream; nothing that a person lived through.
     Tenant(TenantEvent),
 }
@@ -47,6 +48,7 @@ pub enum EventKind {
     QuotasSet = 17,
     PersonErased = 18,
     SegmentClosed = 19,
+    MarkedWrong = 20,
 }
 
 /// A stream began: who, in which world, with which recipe.
@@ -159,6 +161,16 @@ pub struct RetrainFailed {
     pub reason: String,
 }
 
+/// A person said that what the robot did was not what they meant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MarkedWrong {
+    /// The [`Interpreted`] event whose program was not meant.
+    pub act: Seq,
+    /// The words that said so; none when it was a command.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub utterance: Option<Utterance>,
+}
+
 /// The person withdrew. Final.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionClosed {
@@ -179,13 +191,14 @@ impl Event {
             Event::RetrainCompleted(_) => EventKind::RetrainCompleted,
             Event::RetrainFailed(_) => EventKind::RetrainFailed,
             Event::SessionClosed(_) => EventKind::SessionClosed,
+            Event::MarkedWrong(_) => EventKind::MarkedWrong,
             Event::Tenant(event) => event.kind(),
         }
     }
 }
 
 impl EventKind {
-    pub const ALL: [EventKind; 19] = [
+    pub const ALL: [EventKind; 20] = [
         EventKind::SessionOpened,
         EventKind::EpisodeStarted,
         EventKind::Interpreted,
@@ -205,6 +218,7 @@ impl EventKind {
         EventKind::QuotasSet,
         EventKind::PersonErased,
         EventKind::SegmentClosed,
+        EventKind::MarkedWrong,
     ];
 
     /// The version of the body that this binary writes.

@@ -14,8 +14,8 @@ pub use apprentice_core::tenants::{PersonErased, Quotas, Role};
 pub use codec::{DecodeError, decode, encode};
 pub use event::{
     DecompositionDeclined, DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, EventKind,
-    Interpreted, LessonForgotten, RetrainCompleted, RetrainFailed, RetrainScheduled, SessionClosed,
-    SessionOpened,
+    Interpreted, LessonForgotten, MarkedWrong, RetrainCompleted, RetrainFailed, RetrainScheduled,
+    SessionClosed, SessionOpened,
 };
 pub use record::{Batch, Head, Record, Times};
 pub use tenant::{

@@ -100,6 +100,7 @@ fn evidence_of(former: interpreted::Evidence) -> Result<Evidence, String> {
         answered_by: answered_by.into_iter().map(by).collect(),
         mood: None,
         accounting: Vec::new(),
+        replies_to: None,
     })
 }
 

@@ -107,6 +107,7 @@ pub fn body(event: &Event) -> Value {
         Event::RetrainCompleted(event) => serde_json::to_value(event),
         Event::RetrainFailed(event) => serde_json::to_value(event),
         Event::SessionClosed(event) => serde_json::to_value(event),
+        Event::MarkedWrong(event) => serde_json::to_value(event),
         Event::Tenant(event) => serde_json::to_value(event),
     };
     value.expect("an event is plain data")

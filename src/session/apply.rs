@@ -4,7 +4,9 @@
 
 use std::sync::Arc;
 
-use super::state::{Action, Episode, LiveLesson, Opened, State, Unexplained};
+use super::state::{
+    Act, Action, Episode, LiveLesson, OpenQuestion, Opened, State, Unexplained, WrongReading,
+};
 use crate::client::Phase;
 use crate::events::{
     DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, Head, Interpreted, Record,
@@ -78,6 +80,7 @@ pub(super) fn apply_event<D: World>(
             unexplained(state, seq, event.explains)?.settled = true;
         }
         Event::LessonForgotten(event) => forget(state, seq, event.lesson)?,
+        Event::MarkedWrong(event) => mark_wrong(state, seq, event.act)?,
         Event::RetrainScheduled(event) => {
             let live: Vec<Seq> = state.lessons.iter().map(|live| live.seq).collect();
             agree(seq, "live lessons", seqs(&event.lessons), seqs(&live))?;
@@ -142,6 +145,9 @@ fn start<D: World>(
         utterances: 0,
         actions: Vec::new(),
         unexplained: Vec::new(),
+        last_act: None,
+        question: None,
+        wrong: Vec::new(),
     });
     state.episodes += 1;
     state.phase = Phase::Interacting;
@@ -158,6 +164,11 @@ fn interpret<D: World>(
     agree(seq, "actions before", event.actions_before as usize, episode.actions.len())?;
     episode.utterances += 1;
     let guessed = event.answer.guessed();
+    let open = episode.question.take();
+    let answered = event.answer.evidence.replies_to;
+    if answered.is_some() && answered != open.as_ref().map(|open| open.seq) {
+        return Err(outside(seq, "an open question"));
+    }
     let unexplained = |not_sure: bool| {
         Arc::new(Unexplained {
             seq,
@@ -173,8 +184,8 @@ fn interpret<D: World>(
     match &event.answer.outcome {
         Outcome::Understood { program, bindings } => {
             // Nobody but the person knows whether a guess was right: wrong ones can be taught.
-            let guess = guessed.then(|| unexplained(false));
-            episode.unexplained.extend(guess);
+            let unexplained_now = unexplained(false);
+            episode.unexplained.extend(guessed.then(|| unexplained_now.clone()));
             let mut scene = D::Scene::clone(&episode.scene);
             for (index, step) in program.steps.iter().enumerate() {
                 let on = event.answer.chosen_for(index);
@@ -191,8 +202,27 @@ fn interpret<D: World>(
                 agree(seq, "binding", recorded.join(", "), bound.join(", "))?;
                 episode.actions.push(Arc::new(Action { step: step.clone(), binding: bound }));
             }
+            let said = match answered {
+                // The question's utterance was understood after all.
+                Some(asked) => take_unexplained(episode, asked),
+                None => None,
+            };
+            let said = said.unwrap_or_else(|| unexplained_now.clone());
+            if !program.steps.is_empty() {
+                let nearest = event.answer.evidence.nearest.first();
+                let taken_for = nearest.map(|near| near.exemplar.clone());
+                let program = program.clone();
+                let said = Unexplained { not_sure: false, ..Unexplained::clone(&said) };
+                episode.last_act = Some(Arc::new(Act { said, program, taken_for, wrong: false }));
+            }
             episode.scene = Arc::new(scene);
         }
+        Outcome::Asked { question } => {
+            let question = question.clone();
+            episode.unexplained.push(unexplained(true));
+            episode.question = Some(Arc::new(OpenQuestion { seq, question }));
+        }
+        Outcome::Told { .. } => {}
         // A question or a prohibition is not there to be taught.
         Outcome::NotSure if !event.answer.asks() => {}
         outcome @ (Outcome::Impossible { .. } | Outcome::NotSure) => {
@@ -204,6 +234,32 @@ fn interpret<D: World>(
         episode.mentioned = event.answer.mentioned.clone();
     }
     agree(seq, SCENE, event.scene_after, domain.digest(&episode.scene))
+}
+
+/// Takes the utterance of an answered question off what may be taught.
+fn take_unexplained<S, T>(episode: &mut Episode<S, T>, asked: Seq) -> Option<Arc<Unexplained<S>>> {
+    let place = episode.unexplained.iter().position(|said| said.seq == asked)?;
+    Some(episode.unexplained.remove(place))
+}
+
+fn mark_wrong<S: Clone, T>(state: &mut State<S, T>, seq: Seq, act: Seq) -> Result<(), Divergence> {
+    let episode = state.episode.as_mut().ok_or_else(|| outside(seq, "an episode"))?;
+    let last = episode.last_act.as_mut().filter(|last| last.said.seq == act && !last.wrong);
+    let last = Arc::make_mut(last.ok_or_else(|| outside(seq, "an act that can be marked"))?);
+    last.wrong = true;
+    let said = Arc::new(last.said.clone());
+    let utterance = said.utterance.clone();
+    episode.wrong.push(Arc::new(WrongReading { utterance, program: last.program.clone() }));
+    if episode.unexplained.iter().all(|other| other.seq != said.seq) {
+        let place = episode.unexplained.iter().take_while(|other| other.seq < said.seq).count();
+        episode.unexplained.insert(place, said);
+    }
+    episode.utterances += 1;
+    episode.question = None;
+    if state.phase == Phase::Idle {
+        state.phase = Phase::Teaching;
+    }
+    Ok(())
 }
 
 fn end<S, T>(state: &mut State<S, T>, seq: Seq, event: &EpisodeEnded) -> Result<(), Divergence> {

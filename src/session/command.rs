@@ -38,6 +38,8 @@ pub enum Command {
     Forget {
         lesson: Seq,
     },
+    /// What the robot did last is not what was meant.
+    MarkWrong,
     /// Withdraw for good. The reason may be empty.
     Close {
         reason: String,
@@ -79,6 +81,7 @@ impl Command {
             | Command::Teach { .. }
             | Command::FinishTeaching
             | Command::Forget { .. }
+            | Command::MarkWrong
             | Command::FinishRetrain { .. } => Ok(()),
         }
     }
@@ -93,6 +96,7 @@ impl Command {
             Command::Teach { .. } => "teach",
             Command::FinishTeaching => "finish teaching",
             Command::Forget { .. } => "forget",
+            Command::MarkWrong => "mark as wrong",
             Command::Close { .. } => "close",
             Command::FinishRetrain { .. } => "finish retraining",
         }
@@ -110,6 +114,7 @@ impl From<client::Command> for Command {
             }
             client::Command::FinishTeaching => Command::FinishTeaching,
             client::Command::Forget { lesson } => Command::Forget { lesson },
+            client::Command::MarkWrong => Command::MarkWrong,
             client::Command::Close { reason } => Command::Close { reason },
         }
     }

@@ -2,13 +2,14 @@
 //! nothing; the proposed events become true when the log has them.
 
 use super::apply::apply_event;
+use super::dialogue::{self, Said};
 use super::state::{Episode, State, Unexplained};
 use super::{Command, Divergence, Rejection, Session};
 use crate::client::{OnClash, Phase};
 use crate::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
-    Interpreted, LessonForgotten, Report, RetrainCompleted, RetrainFailed, RetrainScheduled,
-    SessionClosed, SessionOpened,
+    Interpreted, LessonForgotten, MarkedWrong, Report, RetrainCompleted, RetrainFailed,
+    RetrainScheduled, SessionClosed, SessionOpened,
 };
 use crate::grounding::Moment;
 use crate::ids::{Digest, Seq, UserId};
@@ -19,7 +20,7 @@ use crate::learning::{self, Lesson, Recipe};
 use crate::limits::{
     EPISODE_ACTIONS_MAX, EPISODE_UTTERANCES_MAX, LESSONS_MAX, SCENE_FILE_BYTES_MAX,
 };
-use crate::world::{Domain, Features, Show, Stage, StageError, Words, World};
+use crate::world::{Domain, Show, Stage, StageError, Words, World};
 
 /// Why a command leads to no event.
 pub(super) enum Refusal {
@@ -78,6 +79,9 @@ pub(super) fn decide<D: Domain>(
         }
         (Phase::Idle, Command::StartEpisode { stage }) => draft.add(start(session, stage)?)?,
         (Phase::Interacting, Command::Say { utterance }) => say(&mut draft, utterance)?,
+        (Phase::Interacting | Phase::Teaching | Phase::Idle, Command::MarkWrong) => {
+            mark_wrong(&mut draft, None)?;
+        }
         (Phase::Interacting, Command::Done) => draft.add(end(&draft.state, Ending::Abandoned))?,
         (Phase::Teaching, Command::Teach { explains, actions, on_clash }) => {
             teach(&mut draft, *explains, actions, *on_clash)?;
@@ -161,7 +165,7 @@ pub(super) fn set<D: World>(domain: &D, stage: &Stage) -> Result<(D::Scene, D::T
     }
 }
 
-fn say<D: Words + Features>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
+fn say<D: Domain>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
     // Of what is said now, `Session::propose` has checked more.
     let utterance = Utterance::recorded(text).map_err(Rejection::from)?;
     let session = draft.session;
@@ -180,7 +184,13 @@ fn say<D: Words + Features>(draft: &mut Draft<D>, text: &str) -> Result<(), Refu
         mentioned: episode.mentioned.as_ref(),
         handled: &handled,
     };
-    let answer = mind.interpret(moment, &utterance);
+    let answer = match dialogue::hear(session, episode, &utterance) {
+        Said::Request => {
+            dialogue::unless_wrong(episode, &utterance, mind.interpret(moment, &utterance))
+        }
+        Said::Wrong => return mark_wrong(draft, Some(utterance)),
+        Said::Answer(answer) => *answer,
+    };
 
     let mut scene = D::Scene::clone(&episode.scene);
     if let Outcome::Understood { program, .. } = &answer.outcome {
@@ -201,6 +211,20 @@ fn say<D: Words + Features>(draft: &mut Draft<D>, text: &str) -> Result<(), Refu
         true => draft.add(end(&draft.state, Ending::Achieved)),
         false => Ok(()),
     }
+}
+
+/// Marks the last act of the present or last episode as wrong.
+///
+/// - `utterance`: the words that say so, if words did.
+fn mark_wrong<D: World>(draft: &mut Draft<D>, utterance: Option<Utterance>) -> Result<(), Refusal> {
+    let episode = draft.state.episode.as_ref().ok_or(Rejection::NothingToMark)?;
+    let last = episode.last_act.as_ref().ok_or(Rejection::NothingToMark)?;
+    if last.wrong {
+        let utterance = last.said.utterance.to_string();
+        return Err(Rejection::MarkedAlready { utterance }.into());
+    }
+    let act = last.said.seq;
+    draft.add(Event::MarkedWrong(MarkedWrong { act, utterance }))
 }
 
 /// The end of the present episode, right after everything that `state` knows.

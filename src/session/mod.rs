@@ -4,6 +4,7 @@
 mod apply;
 mod command;
 mod decide;
+mod dialogue;
 mod rejection;
 mod repeat;
 mod reply;

@@ -51,6 +51,10 @@ pub enum Rejection {
         clash_way_out(*lesson)
     )]
     Clash { utterance: LiftedUtterance, known: LiftedProgram, lesson: Option<Seq> },
+    #[error("there is no act in this task that you could mark as wrong")]
+    NothingToMark,
+    #[error("what I did for \"{utterance}\" is already marked as wrong")]
+    MarkedAlready { utterance: String },
     #[error("there is no lesson at record {lesson}, or it was already forgotten")]
     NoSuchLesson { lesson: Seq },
     #[error("you have {LESSONS_MAX} lessons, and the limit is {LESSONS_MAX}; forget one first")]
@@ -94,6 +98,9 @@ impl Rejection {
             // The code `clash` offers a choice. A seed offers none.
             Rejection::Clash { lesson: None, .. } => RejectionCode::BadTeach,
             Rejection::Clash { .. } => RejectionCode::Clash,
+            Rejection::NothingToMark | Rejection::MarkedAlready { .. } => {
+                RejectionCode::NothingToMark
+            }
             Rejection::NoSuchLesson { .. } => RejectionCode::NoSuchLesson,
             Rejection::TooManyLessons | Rejection::EpisodeFull => RejectionCode::LimitReached,
             Rejection::RequestIdReused { .. } => RejectionCode::RequestIdReused,

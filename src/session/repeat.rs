@@ -39,6 +39,10 @@ pub fn command_of(batch: &[Record]) -> Option<Command> {
             on_clash: OnClash::Ask,
         }),
         Event::LessonForgotten(event) => Some(Command::Forget { lesson: event.lesson }),
+        Event::MarkedWrong(event) => Some(match &event.utterance {
+            Some(utterance) => Command::Say { utterance: utterance.as_str().to_owned() },
+            None => Command::MarkWrong,
+        }),
         Event::RetrainScheduled(_) => Some(Command::FinishTeaching),
         _ => None,
     }

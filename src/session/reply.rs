@@ -45,6 +45,10 @@ fn told(record: &Record) -> Option<Told> {
         Event::RetrainScheduled(event) => Told::Learning { lessons: event.lessons.len() as u32 },
         Event::RetrainCompleted(event) => Told::Learned { mind: event.mind, report: event.report },
         Event::RetrainFailed(event) => Told::LearningFailed { reason: event.reason },
+        Event::MarkedWrong(event) => Told::MarkedWrong {
+            act: event.act,
+            utterance: event.utterance.map(String::from).unwrap_or_default(),
+        },
         Event::SessionClosed(event) => Told::Closed { reason: event.reason },
         Event::Tenant(_) => return None,
     })

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::client::Phase;
 use crate::events::{Head, RetrainScheduled};
 use crate::ids::{Digest, RequestId, Seq, Timestamp, UserId};
-use crate::language::{Step, Symbol, Utterance};
+use crate::language::{LiftedUtterance, Program, Question, Step, Symbol, Utterance};
 use crate::learning::Lesson;
 use crate::limits::REQUEST_RING;
 
@@ -57,8 +57,48 @@ pub struct Episode<S, T> {
     pub mentioned: Option<Symbol>,
     pub utterances: u32,
     pub actions: Vec<Arc<Action>>,
-    /// The utterances that were not carried out or guessed, in the order they were said.
+    /// The utterances that were not carried out, guessed, or carried out wrongly, in the order they
+    /// were said.
     pub unexplained: Vec<Arc<Unexplained<S>>>,
+    /// What was done last for an utterance.
+    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
+    pub last_act: Option<Arc<Act<S>>>,
+    /// The question that the next utterance may answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub question: Option<Arc<OpenQuestion>>,
+    /// Readings that the person called wrong.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wrong: Vec<Arc<WrongReading>>,
+}
+
+fn none<T>() -> Option<T> {
+    None
+}
+
+/// What was done for an utterance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Act<S> {
+    /// The utterance, as it would be taught.
+    pub said: Unexplained<S>,
+    pub program: Program,
+    /// The request that the words were taken for.
+    pub taken_for: Option<LiftedUtterance>,
+    /// Whether the person has called it wrong.
+    pub wrong: bool,
+}
+
+/// A question to the person, and the record that asks it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OpenQuestion {
+    pub seq: Seq,
+    pub question: Question,
+}
+
+/// What an utterance was taken for, wrongly. It is not taken for it again in this episode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WrongReading {
+    pub utterance: Utterance,
+    pub program: Program,
 }
 
 impl<S, T> Episode<S, T> {
@@ -174,7 +214,6 @@ impl RequestRing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::Program;
 
     fn taught(lessons: u64) -> State<(), ()> {
         let live = |seq| {

@@ -59,7 +59,7 @@ impl Talk {
             Outcome::Understood { program, .. } | Outcome::Impossible { program, .. } => {
                 program.to_string()
             }
-            Outcome::NotSure => "?".to_owned(),
+            Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => "?".to_owned(),
         };
         (said, answer.evidence.answered_by)
     }

@@ -52,6 +52,7 @@ fn body(event: &Event) -> Value {
         Event::RetrainCompleted(body) => serde_json::to_value(body),
         Event::RetrainFailed(body) => serde_json::to_value(body),
         Event::SessionClosed(body) => serde_json::to_value(body),
+        Event::MarkedWrong(body) => serde_json::to_value(body),
         Event::Tenant(body) => serde_json::to_value(body),
     };
     json.unwrap()

@@ -2,6 +2,7 @@
 
 mod any_stage;
 mod baseline;
+mod dialogue;
 mod forgetting;
 mod golden;
 mod recorded_sentences;

@@ -145,7 +145,7 @@ fn measure(mind: &Mind, cases: &[Case], show: bool) -> BTreeMap<String, Tally> {
                 tally.impossible += 1;
                 format!("impossible: {program}: {reason}")
             }
-            Outcome::NotSure => {
+            Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => {
                 tally.unsure += 1;
                 let near = answer.evidence.nearest.first();
                 let near = near.map(|near| format!("{} {:.2}", near.exemplar, near.distance));

@@ -56,6 +56,8 @@ impl Talk {
         let found = match &answer.outcome {
             Outcome::Understood { program, .. } => program.to_string(),
             Outcome::Impossible { reason, .. } => format!("! {reason}"),
+            Outcome::Asked { question } => format!("~ {}", question.text),
+            Outcome::Told { text } => format!("i {text}"),
             Outcome::NotSure => "?".to_owned(),
         };
         let agrees = match expected.strip_prefix("! ") {

@@ -122,6 +122,8 @@ fn count(records: &[Record]) -> Vec<Counted> {
                     Outcome::Understood { program, .. } => ("understood", program.steps.len()),
                     Outcome::Impossible { .. } => ("impossible", 0),
                     Outcome::NotSure => ("not_sure", 0),
+                    Outcome::Asked { .. } => ("asked", 0),
+                    Outcome::Told { .. } => ("told", 0),
                 };
                 let program = match &event.answer.outcome {
                     Outcome::Understood { program, .. } => program.to_string(),

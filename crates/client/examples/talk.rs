@@ -23,6 +23,8 @@ pub fn answer(endpoint: &str, sentence: &str) -> Result<String, Box<dyn Error>> 
         Outcome::Understood { program, .. } => format!("done: {program}"),
         Outcome::Impossible { reason, .. } => format!("impossible: {reason}"),
         Outcome::NotSure => "not sure".to_owned(),
+        Outcome::Asked { question } => question.text.clone(),
+        Outcome::Told { text } => text.clone(),
     });
     Ok(answers.collect())
 }

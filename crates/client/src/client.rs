@@ -326,6 +326,11 @@ impl Client {
         self.command(Command::Forget { lesson })
     }
 
+    /// Says that what the robot did last is not what was meant.
+    pub fn mark_wrong(&self) -> Result<Reply, ClientError> {
+        self.command(Command::MarkWrong)
+    }
+
     /// Withdraws the person. No command is accepted afterwards.
     ///
     /// - `reason`: may be empty.

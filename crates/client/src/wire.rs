@@ -18,7 +18,7 @@ use crate::protocol::{
 pub const VERSION: u64 = 1;
 
 /// The commands that people may send, as they are spelled on the wire.
-pub const COMMANDS: [&str; 7] = Command::NAMES;
+pub const COMMANDS: [&str; 8] = Command::NAMES;
 /// Commands that only the service itself gives. A message with one of them is refused.
 pub const INTERNAL_COMMANDS: [&str; 2] = ["open", "finish_retrain"];
 /// The queries, as they are spelled on the wire.

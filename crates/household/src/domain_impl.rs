@@ -3,6 +3,7 @@ use std::collections::BTreeSet;
 use super::facts::{Kind, Room, facts};
 use super::features::{FEATURE_COUNT, features};
 use super::primitives::{Action, Chosen, act_on};
+use super::refusal::preposition;
 use super::scene::Scene;
 use super::state_words::StateWord;
 use super::task::{Goal, Task};
@@ -217,6 +218,14 @@ impl Words for Household {
 
     fn is_instance_word(&self, word: &str) -> bool {
         StateWord::read(word).is_some()
+    }
+
+    fn called(&self, name: &str) -> String {
+        view::said(name)
+    }
+
+    fn preposition(&self, kind: &Symbol) -> &'static str {
+        facts().kind(kind.as_str()).map_or("on", preposition)
     }
 }
 

@@ -61,7 +61,7 @@ pub(super) fn narrate(step: &Step, binding: &[String]) -> String {
 }
 
 /// `CounterTop 2` → `counter top 2`.
-fn said(name: &str) -> String {
+pub(super) fn said(name: &str) -> String {
     let (kind, number) = match name.split_once(' ') {
         Some((kind, number)) => (kind, format!(" {number}")),
         None => (name, String::new()),

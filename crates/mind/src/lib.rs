@@ -4,6 +4,7 @@
 
 use apprentice_core::{ids, language, limits, numerics, world};
 
+pub mod dialogue;
 pub mod grounding;
 pub mod learning;
 pub mod parser;

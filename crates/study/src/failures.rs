@@ -144,6 +144,8 @@ impl<'a> Explain<'a> {
                 };
                 format!("{what}; the world says: {}", pattern(reason))
             }
+            Outcome::Asked { question } => format!("asked: {}", question.text),
+            Outcome::Told { .. } => "taken for a question".to_owned(),
             Outcome::NotSure => self.unsure(core, &mentions, held.as_ref(), answer),
         };
         self.failure(row, verdict, reason, answer)
@@ -161,7 +163,9 @@ impl<'a> Explain<'a> {
                     operators(&program.steps.iter().collect::<Vec<_>>())
                 )
             }
-            Outcome::NotSure => "untaught".to_owned(),
+            Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => {
+                "untaught".to_owned()
+            }
         };
         self.failure(row, verdict, reason, answer)
     }
@@ -175,6 +179,8 @@ impl<'a> Explain<'a> {
         answer: &Answer,
     ) -> Failure {
         let reason = match &answer.outcome {
+            Outcome::Asked { question } => format!("asked: {}", question.text),
+            Outcome::Told { .. } => "taken for a question".to_owned(),
             Outcome::NotSure => match (&answer.evidence, answer.evidence.discarded.first()) {
                 (Evidence { mood: Some(_), .. }, _) => "taken for no request".to_owned(),
                 (evidence, _) if evidence.left_over().next().is_some() => {
@@ -268,6 +274,8 @@ impl<'a> Explain<'a> {
             Outcome::Impossible { program, reason, .. } => {
                 format!("impossible: {program} ({reason})")
             }
+            Outcome::Asked { question } => format!("asked: {}", question.text),
+            Outcome::Told { text } => format!("told: {text}"),
             Outcome::NotSure => match answer.evidence.discarded.first() {
                 Some(discarded) => {
                     format!("not sure: dropped {} ({})", discarded.program, discarded.reason)

@@ -42,7 +42,9 @@ pub fn judge_primitive(gold: &Program, outcome: &Outcome) -> Verdict {
     let answer = match outcome {
         Outcome::Understood { program, .. } => program,
         Outcome::Impossible { .. } => return Verdict::Impossible,
-        Outcome::NotSure => return Verdict::NotSure,
+        Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => {
+            return Verdict::NotSure;
+        }
     };
     match says_core(gold, answer) {
         true => Verdict::Right,
@@ -116,7 +118,7 @@ pub fn judge_taught(
             if same { Verdict::Right } else { Verdict::Wrong }
         }
         Outcome::Impossible { .. } => Verdict::Impossible,
-        Outcome::NotSure => Verdict::NotSure,
+        Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => Verdict::NotSure,
     }
 }
 
@@ -126,7 +128,7 @@ pub fn judge_taught(
 pub fn accepted_as(lesson: &Program, outcome: &Outcome) -> bool {
     let answer = match outcome {
         Outcome::Understood { program, .. } | Outcome::Impossible { program, .. } => program,
-        Outcome::NotSure => return false,
+        Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => return false,
     };
     let without_walks = |program: &'_ Program| -> Vec<Step> {
         program.steps.iter().filter(|s| !walks(s)).cloned().collect()

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use apprentice::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
-    Interpreted, KeyAdmitted, KeyRetired, LessonForgotten, Overlap, PersonErased, Quotas,
-    QuotasSet, Report, RetrainCompleted, RetrainFailed, RetrainScheduled, Role, SegmentClosed,
-    SessionClosed, SessionOpened, TenantDisabled, TenantEnabled, TenantOpened,
+    Interpreted, KeyAdmitted, KeyRetired, LessonForgotten, MarkedWrong, Overlap, PersonErased,
+    Quotas, QuotasSet, Report, RetrainCompleted, RetrainFailed, RetrainScheduled, Role,
+    SegmentClosed, SessionClosed, SessionOpened, TenantDisabled, TenantEnabled, TenantOpened,
 };
 use apprentice::ids::{Digest, PublicKey, Seq, Signature, StreamKey, Timestamp, UserId};
 use apprentice::language::{
-    Accounted, Answer, Answerer, Discarded, Document, Evidence, LiftedUtterance, Mood, Near,
-    Outcome, Program, Symbol, Use, Utterance,
+    Accounted, Answer, Answerer, Choice, Discarded, Document, Evidence, LiftedUtterance, Mood,
+    Near, Outcome, Program, Question, Symbol, Use, Utterance,
 };
 use serde_json::json;
 
@@ -28,6 +28,9 @@ pub fn samples() -> Vec<(&'static str, Event)> {
         ("interpreted_chosen", Event::Interpreted(chosen())),
         ("interpreted_forbidden", Event::Interpreted(forbidden())),
         ("interpreted_left_over", Event::Interpreted(left_over())),
+        ("interpreted_asked", Event::Interpreted(asked())),
+        ("interpreted_told", Event::Interpreted(told())),
+        ("interpreted_choice", Event::Interpreted(choice())),
         ("episode_ended", Event::EpisodeEnded(episode_ended(Ending::Achieved))),
         ("episode_ended_abandoned", Event::EpisodeEnded(episode_ended(Ending::Abandoned))),
         ("decomposition_taught", Event::DecompositionTaught(taught())),
@@ -37,6 +40,8 @@ pub fn samples() -> Vec<(&'static str, Event)> {
         ("retrain_completed", Event::RetrainCompleted(completed())),
         ("retrain_failed", Event::RetrainFailed(failed())),
         ("session_closed", Event::SessionClosed(closed())),
+        ("marked_wrong", Event::MarkedWrong(marked_wrong(Some("that was wrong")))),
+        ("marked_wrong_by_command", Event::MarkedWrong(marked_wrong(None))),
         ("tenant_opened", TenantOpened {}.into()),
         ("key_admitted", key_admitted().into()),
         ("key_retired", key_retired().into()),
@@ -67,7 +72,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("episode_started.seed", "seed of a drawn stage; null when a scene file was given"),
     ("episode_started.fewest", "the fewest primitives that achieve the task, if known"),
     ("interpreted.utterance", "what was typed"),
-    ("interpreted.answer.outcome", "understood, impossible or not_sure"),
+    ("interpreted.answer.outcome", "understood, impossible, not_sure, asked or told"),
     ("interpreted.answer.outcome.understood.program", "what was carried out"),
     ("interpreted.answer.outcome.understood.bindings[][]", "the things each step acted on"),
     ("interpreted.answer.outcome.impossible.program", "what was understood and not carried out"),
@@ -89,6 +94,15 @@ pub const MEANINGS: &[(&str, &str)] = &[
         "interpreted.answer.evidence.mood.forbidden.word",
         "the word that forbids; likewise asked, told, conditional, later, reordered; absent: a request",
     ),
+    ("interpreted.answer.outcome.asked.question.text", "the question to the person"),
+    ("interpreted.answer.outcome.asked.question.choices[].label", "an answer that it offers"),
+    ("interpreted.answer.outcome.asked.question.choices[].program", "what that answer leads to"),
+    (
+        "interpreted.answer.outcome.asked.question.choices[].mentioned",
+        "the type that the program is about, for a later \"it\"",
+    ),
+    ("interpreted.answer.outcome.told.text", "what the robot said"),
+    ("interpreted.answer.evidence.replies_to", "the record with the question that this answers"),
     ("interpreted.answer.evidence.lifted[]", "the utterance as the parser saw it, by clause"),
     ("interpreted.answer.evidence.nearest[].exemplar", "a near exemplar, nearest first"),
     ("interpreted.answer.evidence.nearest[].program", "what it stands for"),
@@ -129,6 +143,8 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("retrain_completed.code", "digest of the code that trained; null when version 1 did not say"),
     ("retrain_failed.recipe", "digest of the recipe"),
     ("retrain_failed.reason", "why; the previous mind stays"),
+    ("marked_wrong.act", "the record of the act that was not meant"),
+    ("marked_wrong.utterance", "the words that said so; absent when it was a command"),
     ("session_closed.reason", "why the person withdrew"),
     ("key_admitted.key", "the public half of a CURVE key"),
     ("key_admitted.role", "gateway, operator or auditor"),
@@ -362,6 +378,54 @@ fn failed() -> RetrainFailed {
         recipe: Digest::of(b"paper"),
         reason: "the seed \"go to <obj>\" lost its own program".to_owned(),
     }
+}
+
+fn asked() -> Interpreted {
+    let choice = |label: &str, kind: &str| Choice {
+        label: label.to_owned(),
+        program: format!("GOTO {kind}").parse().unwrap(),
+        chosen: Vec::new(),
+        mentioned: Some(Symbol::new(kind)),
+    };
+    let question = Question {
+        text: "Which table: the dining table or the side table?".to_owned(),
+        choices: vec![
+            choice("the dining table", "DiningTable"),
+            choice("the side table", "SideTable"),
+        ],
+    };
+    let mut event = interpreted(Outcome::Asked { question });
+    event.utterance = utterance("go to the table");
+    event.answer.mentioned = None;
+    event.answer.evidence = Evidence {
+        lifted: vec![LiftedUtterance::parse("go to the <obj>")],
+        threshold: 0.5,
+        ..Evidence::default()
+    };
+    event
+}
+
+fn told() -> Interpreted {
+    let text = "The mug is in the sink basin.".to_owned();
+    let mut event = interpreted(Outcome::Told { text });
+    event.utterance = utterance("where is the mug?");
+    event.answer.mentioned = None;
+    event.answer.evidence = Evidence::default();
+    event
+}
+
+fn choice() -> Interpreted {
+    let program = "GOTO SideTable".parse().unwrap();
+    let bindings = vec![vec!["SideTable".to_owned()]];
+    let mut event = interpreted(Outcome::Understood { program, bindings });
+    event.utterance = utterance("the side table");
+    event.answer.mentioned = Some(Symbol::new("SideTable"));
+    event.answer.evidence = Evidence { replies_to: Some(seq(3)), ..Evidence::default() };
+    event
+}
+
+fn marked_wrong(words: Option<&str>) -> MarkedWrong {
+    MarkedWrong { act: seq(4), utterance: words.map(utterance) }
 }
 
 fn closed() -> SessionClosed {

@@ -254,6 +254,14 @@ impl Words for Bells {
     fn is_instance_word(&self, _: &str) -> bool {
         false
     }
+
+    fn called(&self, name: &str) -> String {
+        name.to_lowercase()
+    }
+
+    fn preposition(&self, _: &Symbol) -> &'static str {
+        "on"
+    }
 }
 
 impl Features for Bells {
@@ -288,7 +296,6 @@ impl Show for Bells {
         };
         View { summary: Vec::new(), things: BELLS.iter().map(thing).collect() }
     }
-
     fn narrate(&self, step: &Step, binding: &[String]) -> String {
         format!("{} {}", step.operator.as_str().to_lowercase(), binding.join(" "))
     }

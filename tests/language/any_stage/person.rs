@@ -157,7 +157,9 @@ impl<'a> Person<'a> {
             Event::Interpreted(event) => match event.answer.outcome {
                 Outcome::Understood { .. } => counts.understood += 1,
                 Outcome::Impossible { .. } => counts.impossible += 1,
-                Outcome::NotSure => counts.not_sure += 1,
+                Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => {
+                    counts.not_sure += 1;
+                }
             },
             Event::EpisodeEnded(event) => match event.ending {
                 Ending::Achieved => counts.achieved += 1,

@@ -278,6 +278,8 @@ pub fn shown(answer: &Answer) -> String {
     match &answer.outcome {
         Outcome::Understood { program, .. } => program.to_string(),
         Outcome::Impossible { reason, .. } => format!("! {reason}"),
+        Outcome::Asked { question } => format!("~ {}", question.text),
+        Outcome::Told { text } => format!("i {text}"),
         Outcome::NotSure => "?".to_owned(),
     }
 }

@@ -25,6 +25,7 @@ pub fn requests() -> Vec<(&'static str, Ask)> {
         ("teach replace", teach(vec![2, 3, 4], OnClash::Replace)),
         ("finish_teaching", command(Command::FinishTeaching)),
         ("forget", command(Command::Forget { lesson: seq(9) })),
+        ("mark_wrong", command(Command::MarkWrong)),
         ("close", command(Command::Close { reason: "the study is over".into() })),
         ("status", Ask::Person(PersonAsk::Query(Query::Status))),
         ("look", Ask::Person(PersonAsk::Query(Query::Look))),

@@ -11,8 +11,8 @@ use apprentice::client::{
 use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::ids::{Digest, RequestId, Signature, StreamKey, Timestamp};
 use apprentice::language::{
-    Accounted, Answer, Discarded, Evidence, Exemplar, LiftedUtterance, Mood, Near, Outcome, Symbol,
-    Use,
+    Accounted, Answer, Choice, Discarded, Evidence, Exemplar, LiftedUtterance, Mood, Near, Outcome,
+    Question, Symbol, Use,
 };
 use apprentice::tenancy::Role;
 use apprentice::world::{Thing, View};
@@ -88,6 +88,9 @@ pub fn responses() -> Vec<(&'static str, Response)> {
             ),
         ),
         ("learning", reply(9, vec![Told::Learning { lessons: 1 }])),
+        ("asked which", asked_which()),
+        ("told", told_where()),
+        ("marked_wrong", reply(5, vec![marked()])),
         ("closed", reply(14, vec![Told::Closed { reason: "the study is over".into() }])),
         ("waited", Response::Waited(Waited { status: idle.clone(), told: vec![learned()] })),
         (
@@ -312,6 +315,29 @@ fn chosen() -> Response {
         ..Evidence::default()
     };
     told("please pick up mug 2", outcome, evidence, vec![vec![Some(mug)]])
+}
+
+fn asked_which() -> Response {
+    let choice = |label: &str, kind: &str| Choice {
+        label: label.to_owned(),
+        program: format!("GOTO {kind}").parse().unwrap(),
+        chosen: Vec::new(),
+        mentioned: Some(Symbol::new(kind)),
+    };
+    let text = "Which table: the dining table or the side table?".to_owned();
+    let choices =
+        vec![choice("the dining table", "DiningTable"), choice("the side table", "SideTable")];
+    let outcome = Outcome::Asked { question: Question { text, choices } };
+    told("go to the table", outcome, Evidence::default(), Vec::new())
+}
+
+fn told_where() -> Response {
+    let text = "The mug is in the sink basin.".to_owned();
+    told("where is the mug?", Outcome::Told { text }, Evidence::default(), Vec::new())
+}
+
+fn marked() -> Told {
+    Told::MarkedWrong { act: seq(4), utterance: "that was wrong".to_owned() }
 }
 
 fn asked() -> Response {

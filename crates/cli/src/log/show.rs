@@ -48,6 +48,8 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
         Event::Interpreted(event) => {
             let outcome = match &event.answer.outcome {
                 Outcome::Understood { program, .. } => format!("= {program}"),
+                Outcome::Asked { question } => format!("~ asked ({})", question.text),
+                Outcome::Told { text } => format!("i told ({text})"),
                 Outcome::NotSure => match event.answer.evidence.passed_over() {
                     Some(words) => format!("? not sure ({words})"),
                     None => "? not sure".to_owned(),
@@ -94,6 +96,7 @@ fn sentences(event: &Event) -> (String, Vec<String>) {
             vec![format!("threshold {:.3}", event.report.threshold)],
         ),
         Event::RetrainFailed(event) => (event.reason.clone(), vec![]),
+        Event::MarkedWrong(event) => (format!("record {}", event.act), vec![]),
         Event::SessionClosed(event) => (event.reason.clone(), vec![]),
         Event::Tenant(event) => (tenants(event), vec![]),
     }

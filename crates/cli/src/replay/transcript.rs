@@ -108,6 +108,7 @@ impl<D: Domain> History<D> {
             Some(Command::Teach { explains, actions, on_clash }) => {
                 return self.teach(out, batch, explains, &actions, on_clash);
             }
+            Some(Command::MarkWrong) => say!(out, "wrong")?,
             Some(Command::Forget { lesson }) => return self.forget(out, lesson),
             _ => {}
         }
@@ -125,6 +126,7 @@ impl<D: Domain> History<D> {
                         (count(event.utterances, "utterance"), count(event.actions, "action"));
                     say!(out, "achieved ({said}, {done})")?;
                 }
+                Event::MarkedWrong(_) => say!(out, "w marked")?,
                 Event::RetrainCompleted(event) => {
                     let examples = event.report.exemplars;
                     say!(out, "learn {examples} examples (mind {})", event.mind.short())?;

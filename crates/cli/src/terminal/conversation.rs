@@ -136,6 +136,7 @@ impl<'a> Conversation<'a> {
     fn say(&mut self, utterance: &str) -> Result<Flow, Failure> {
         let said = self.robot.say(utterance);
         let Some(reply) = self.or_tell(said)? else { return Ok(Flow::On) };
+        self.tell_marked(&reply)?;
         let status = self.status()?;
         for told in &reply.told {
             if let Told::Answered { utterance, answer, actions_before, .. } = told {
@@ -199,6 +200,7 @@ impl<'a> Conversation<'a> {
             Command::Help => self.report(&print::help()),
             Command::Done => self.done(),
             Command::Forget(number) => self.forget(number),
+            Command::Wrong => self.mark_wrong(),
             Command::Task(task) => {
                 self.tell_one(&format!("The next task will be: {task}."))?;
                 self.stages.put_first(task);
@@ -206,6 +208,26 @@ impl<'a> Conversation<'a> {
             }
             Command::Quit => Ok(Flow::Quit),
         }
+    }
+
+    fn mark_wrong(&mut self) -> Result<Flow, Failure> {
+        let marked = self.robot.mark_wrong();
+        match self.or_tell(marked)? {
+            Some(reply) => self.tell_marked(&reply),
+            None => Ok(Flow::On),
+        }
+    }
+
+    fn tell_marked(&mut self, reply: &Reply) -> Result<Flow, Failure> {
+        for told in &reply.told {
+            if let Told::MarkedWrong { .. } = told {
+                self.tell_one(
+                    "I'm sorry. I won't take it for that again in this task. Do it in small steps, \
+                     then teach me.",
+                )?;
+            }
+        }
+        Ok(Flow::On)
     }
 
     /// A lesson is taken back at once where that is possible, else when the task is over.

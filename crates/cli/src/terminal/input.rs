@@ -22,6 +22,8 @@ pub enum Command {
     Done,
     /// The lesson's number, as `:known` shows it.
     Forget(u64),
+    /// The last act is not what was meant.
+    Wrong,
     /// What the next episode is about, in the domain's words.
     Task(String),
     Quit,
@@ -114,6 +116,7 @@ impl FromStr for Command {
             "status" | "s" => Command::Status,
             "help" | "h" | "?" => Command::Help,
             "done" => Command::Done,
+            "wrong" => Command::Wrong,
             "quit" | "q" => Command::Quit,
             "forget" => {
                 let number = argument.trim_start_matches('#').parse().ok().filter(|&n| n > 0);

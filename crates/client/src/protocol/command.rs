@@ -36,6 +36,8 @@ pub enum Command {
         /// The record of the lesson.
         lesson: Seq,
     },
+    /// What the robot did last is not what was meant.
+    MarkWrong,
     /// Withdraw. No command is accepted afterwards.
     Close {
         /// May be empty.
@@ -70,6 +72,14 @@ pub enum Query {
 
 impl Command {
     /// The commands, as they are spelled on the wire.
-    pub const NAMES: [&str; 7] =
-        ["start_episode", "say", "done", "teach", "finish_teaching", "forget", "close"];
+    pub const NAMES: [&str; 8] = [
+        "start_episode",
+        "say",
+        "done",
+        "teach",
+        "finish_teaching",
+        "forget",
+        "mark_wrong",
+        "close",
+    ];
 }

@@ -85,6 +85,13 @@ pub enum Told {
         /// What had been said.
         utterance: String,
     },
+    /// An act was marked as wrong. Its utterance may be taught.
+    MarkedWrong {
+        /// The record of the act.
+        act: Seq,
+        /// The words that said so; empty when it was a command.
+        utterance: String,
+    },
     /// A training is due.
     Learning {
         /// Lessons that the new mind is trained on.

@@ -155,6 +155,8 @@ pub enum RejectionCode {
     BadTeach,
     /// The same words were taught before and mean something else.
     Clash,
+    /// There is no act that could be marked as wrong, or it was marked already.
+    NothingToMark,
     /// No lesson has this record, or it was forgotten.
     NoSuchLesson,
     /// The session has reached a limit, such as the number of lessons.

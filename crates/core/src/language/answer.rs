@@ -3,6 +3,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::{LiftedProgram, LiftedUtterance, Program, Symbol};
+use crate::ids::Seq;
 
 /// What came of one utterance, and why. A person, an auditor or a simulated teacher may ask for any
 /// of it later.
@@ -64,6 +65,47 @@ pub enum Outcome {
     },
     /// Nothing known is close enough. Nothing was carried out.
     NotSure,
+    /// Several readings are as good, so the person is asked which was meant. Nothing was carried out.
+    Asked {
+        /// What is asked.
+        question: Question,
+    },
+    /// The person asked something, or said something that needs no act, and this is the answer.
+    /// Nothing was carried out.
+    Told {
+        /// One sentence, or a few.
+        text: String,
+    },
+}
+
+impl Outcome {
+    /// Whether nothing was carried out, and nothing would have been.
+    pub fn is_no_program(&self) -> bool {
+        matches!(self, Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. })
+    }
+}
+
+/// A question to the person. It is open until the next utterance, or until the episode ends.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Question {
+    /// `Which table: the dining table or the side table?`
+    pub text: String,
+    /// What the person may choose from, in the order of the text. One choice is a yes-or-no question.
+    pub choices: Vec<Choice>,
+}
+
+/// One answer that a [`Question`] offers, and what is done when the person gives it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Choice {
+    /// As it stands in the question: `the dining table`.
+    pub label: String,
+    /// What is carried out.
+    pub program: Program,
+    /// As [`Answer::chosen`], for this program.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub chosen: Vec<Vec<Option<String>>>,
+    /// As [`Answer::mentioned`], for this program.
+    pub mentioned: Option<Symbol>,
 }
 
 /// Why the answer is what it is.
@@ -90,6 +132,9 @@ pub struct Evidence {
     /// nearest reading that left words unused. Empty where the recipe does not account for words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub accounting: Vec<Accounted>,
+    /// The record with the question that this utterance answered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub replies_to: Option<Seq>,
 }
 
 impl Evidence {

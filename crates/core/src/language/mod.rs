@@ -14,7 +14,9 @@ mod signature;
 mod symbol;
 mod utterance;
 
-pub use answer::{Accounted, Answer, Answerer, Discarded, Evidence, Mood, Near, Outcome, Use};
+pub use answer::{
+    Accounted, Answer, Answerer, Choice, Discarded, Evidence, Mood, Near, Outcome, Question, Use,
+};
 pub use clause::Clause;
 pub use document::Document;
 pub use grammar::{Grammar, Verb};

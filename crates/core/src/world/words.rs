@@ -72,4 +72,10 @@ pub trait Words: World {
     /// of these words are also verbs and prepositions ("open", "clean", "on"); ask only about a
     /// word that stands between an article and the name.
     fn is_instance_word(&self, word: &str) -> bool;
+
+    /// A thing's or a type's name in a person's words: `CounterTop 2` → `counter top 2`.
+    fn called(&self, name: &str) -> String;
+
+    /// Whether things are put `in` or `on` things of a type.
+    fn preposition(&self, kind: &Symbol) -> &'static str;
 }

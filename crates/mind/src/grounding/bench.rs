@@ -218,6 +218,14 @@ impl Words for Bench {
     fn is_instance_word(&self, _: &str) -> bool {
         false
     }
+
+    fn called(&self, name: &str) -> String {
+        name.to_lowercase()
+    }
+
+    fn preposition(&self, _: &Symbol) -> &'static str {
+        "on"
+    }
 }
 
 impl Features for Bench {

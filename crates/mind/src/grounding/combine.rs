@@ -82,6 +82,18 @@ pub struct Candidate {
     pub left_over: Vec<String>,
 }
 
+impl Candidate {
+    /// Per step the things that words chose; empty when they chose none.
+    pub fn chosen(&self) -> Vec<Vec<Option<String>>> {
+        match &self.verdict {
+            Verdict::Runs { chosen, .. } if chosen.iter().any(|step| !step.is_empty()) => {
+                chosen.clone()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// What the world says to a program.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {

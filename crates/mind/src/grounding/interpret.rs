@@ -1,4 +1,5 @@
 use super::abstractor::{Abstracted, Abstractor, without_locations};
+use super::asking::{Taken, which};
 use super::combine::{Candidate, Context, Offer, Verdict, combine};
 use super::moment::Moment;
 use super::reranker::Reranker;
@@ -6,7 +7,8 @@ use super::resolver::resolve;
 use super::settings::{Abstraction, Execution};
 use crate::language::{
     Accounted, Answer, Clause, Discarded, Evidence, Grammar, LiftedArg, LiftedProgram, LiftedStep,
-    LiftedUtterance, Mention, Mood, Near, Outcome, Roles, Symbol, Use, Utterance, Word, WordLists,
+    LiftedUtterance, Mention, Mood, Near, Outcome, Question, Roles, Symbol, Use, Utterance, Word,
+    WordLists,
 };
 use crate::limits::{CANDIDATES_MAX, EVIDENCE_DISCARDED_MAX, EVIDENCE_NEAREST_MAX};
 use crate::parser::{Parse, Scored, SemanticParser};
@@ -28,6 +30,9 @@ pub struct Interpreter<'a, P> {
     pub seeds: u32,
     /// Of the world's words.
     pub edition: Edition,
+    /// Ask which thing is meant, unless recorded people meant the nearest one in at least so many of
+    /// 100 uses of its name; 0 never asks.
+    pub ask_below: u32,
 }
 
 impl<P: SemanticParser> Interpreter<'_, P> {
@@ -89,6 +94,10 @@ impl<P: SemanticParser> Interpreter<'_, P> {
         // world does not allow.
         let left = candidates.first().is_some_and(|first| !first.left_over.is_empty());
         let told = chosen.or_else(|| candidates.iter().find(is_forbidden).filter(|_| !left));
+        let question = chosen.and_then(|chosen| self.question(moment, &heard, chosen));
+        if let Some(question) = question {
+            return heard.asked(question);
+        }
         let outcome = told.map_or(Outcome::NotSure, outcome_of);
         let mentioned = match told {
             Some(candidate) => candidate.mentioned.clone(),
@@ -103,11 +112,23 @@ impl<P: SemanticParser> Interpreter<'_, P> {
             _ => Vec::new(),
         };
         evidence.discarded = discarded(&candidates, told);
-        let chosen = told.map(chosen_of).unwrap_or_default();
+        let chosen = told.map(Candidate::chosen).unwrap_or_default();
         if self.accounts() {
             evidence.accounting = heard.account(told.or(candidates.first()));
         }
         Answer { outcome, evidence, mentioned, chosen }
+    }
+
+    /// What to ask before `chosen` is carried out; none when it is clear enough.
+    fn question<D: Words + Features>(
+        &self,
+        moment: &Moment<'_, D>,
+        heard: &Heard<'_>,
+        chosen: &Candidate,
+    ) -> Option<Question> {
+        let (edition, mentions) = (self.edition, heard.mentions());
+        let taken = Taken { moment, edition, candidate: chosen, mentions };
+        (self.ask_below > 0).then(|| which(&taken, self.ask_below)).flatten()
     }
 
     /// Every candidate that runs, nearest first, exact or not. The reranker learns to choose from
@@ -405,6 +426,26 @@ impl Heard<'_> {
         self.whole.literal() || (waits_later && self.parts.len() >= LONG_CLAUSES_MIN)
     }
 
+    /// Everything that was named, in order.
+    fn mentions(&self) -> &[Mention] {
+        &self.whole.readings[0].0.mentions
+    }
+
+    /// The answer when the person is asked what was meant.
+    fn asked(&self, question: Question) -> Answer {
+        let evidence = Evidence {
+            lifted: vec![self.whole.lifted().clone()],
+            threshold: self.threshold(),
+            ..Evidence::default()
+        };
+        Answer {
+            outcome: Outcome::Asked { question },
+            evidence,
+            mentioned: None,
+            chosen: Vec::new(),
+        }
+    }
+
     /// The answer to an utterance that is not a request. It names the words that show it.
     fn not_asked<D: Words + Features>(&self, moment: &Moment<'_, D>) -> Answer {
         let mood = self.abstracted.mood.clone();
@@ -550,16 +591,6 @@ fn keep_before_the_final(candidates: &mut Vec<Candidate>) {
 
 fn feasible(candidates: &[Candidate]) -> Vec<&Candidate> {
     candidates.iter().filter(|c| matches!(c.verdict, Verdict::Runs { .. })).collect()
-}
-
-/// Per step the things that words chose; empty when they chose none.
-fn chosen_of(candidate: &Candidate) -> Vec<Vec<Option<String>>> {
-    match &candidate.verdict {
-        Verdict::Runs { chosen, .. } if chosen.iter().any(|step| !step.is_empty()) => {
-            chosen.clone()
-        }
-        _ => Vec::new(),
-    }
 }
 
 fn outcome_of(candidate: &Candidate) -> Outcome {

@@ -6,6 +6,7 @@
 mod abstractor;
 mod accounting;
 mod arguments;
+mod asking;
 #[cfg(test)]
 pub(crate) mod bench;
 mod carrying;
@@ -30,9 +31,11 @@ mod tests;
 mod verbs;
 
 pub use abstractor::{Abstracted, Abstractor, without_locations};
+pub(crate) use asking::listed;
 pub use combine::{Candidate, Verdict};
 pub use interpret::Interpreter;
 pub use moment::Moment;
+pub(crate) use names::Names;
 pub use rerank_training::{Choice, RerankerFigures};
 pub use reranker::{Featured, Reranker, RerankerSettings, RerankerWeights, featured};
 pub use resolver::{Referents, resolve};

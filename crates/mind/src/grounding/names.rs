@@ -7,19 +7,19 @@ const FORGIVEN_LETTERS_MIN: usize = 5;
 
 /// Finds the lexicon's names in a run of words.
 #[derive(Debug)]
-pub(super) struct Names<'a> {
+pub(crate) struct Names<'a> {
     lexicon: &'a Lexicon,
     summary: &'a NameSummary,
 }
 
 impl<'a> Names<'a> {
     /// The names of this lexicon.
-    pub(super) fn new(lexicon: &'a Lexicon) -> Names<'a> {
+    pub(crate) fn new(lexicon: &'a Lexicon) -> Names<'a> {
         Names { lexicon, summary: lexicon.summary() }
     }
 
     /// The longest name or pronoun that `words` starts with, and how many words it takes.
-    pub(super) fn starting(&self, words: &[&str]) -> Option<(usize, Mention)> {
+    pub(crate) fn starting(&self, words: &[&str]) -> Option<(usize, Mention)> {
         let first = words.first()?;
         for count in (1..=self.summary.longest.min(words.len())).rev() {
             let window = &words[..count];

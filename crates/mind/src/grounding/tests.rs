@@ -72,6 +72,7 @@ impl Talk {
             reranker: None,
             seeds,
             edition: Edition::First,
+            ask_below: 0,
         };
         let mentioned = self.mentioned.as_ref();
         let moment =
@@ -86,6 +87,8 @@ impl Talk {
             Outcome::Impossible { program, step, reason } => {
                 format!("! {program} @{step}: {reason}")
             }
+            Outcome::Asked { question } => format!("~ {}", question.text),
+            Outcome::Told { text } => format!("i {text}"),
             Outcome::NotSure => "?".to_owned(),
         };
         assert_eq!(found, expected, "{text:?}");

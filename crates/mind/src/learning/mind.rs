@@ -148,6 +148,7 @@ impl Mind {
             reranker: self.reranker.as_ref(),
             seeds: self.seeds,
             edition: settings.words.edition,
+            ask_below: settings.dialogue.as_ref().map_or(0, |dialogue| dialogue.which_below),
         }
     }
 

@@ -2,6 +2,7 @@ use std::sync::{LazyLock, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
+use crate::dialogue::Dialogue;
 use crate::grounding::{Abstraction, Execution, RerankerSettings, Split};
 use crate::ids::Digest;
 use crate::language::Document;
@@ -36,6 +37,9 @@ pub struct RecipeSettings {
     pub parser: ParserSettings,
     /// How the reranker is trained.
     pub reranker: RerankerSettings,
+    /// What there is of a conversation beside requests; none in the recipes before `default-3`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dialogue: Option<Dialogue>,
 }
 
 /// Which words a mind knows: their vectors, and what things are called.
@@ -106,6 +110,8 @@ struct RecipeFile {
     execution: Execution,
     parser: ParserSettings,
     reranker: RerankerSettings,
+    #[serde(default)]
+    dialogue: Option<Dialogue>,
 }
 
 /// Where a recipe file is wrong: a sentence with what was expected there.
@@ -123,6 +129,7 @@ pub struct RecipeError {
 const PAPER: &str = include_str!("../../data/recipes/paper.toml");
 const DEFAULT_1: &str = include_str!("../../data/recipes/default-1.toml");
 const DEFAULT_2: &str = include_str!("../../data/recipes/default-2.toml");
+const DEFAULT_3: &str = include_str!("../../data/recipes/default-3.toml");
 /// Trains in a few milliseconds, for tests and simulations.
 const TINY: &str = include_str!("../../data/recipes/tiny.toml");
 // The paper's baseline, and its two halves alone.
@@ -131,7 +138,8 @@ const SEQ2SEQ: &str = include_str!("../../data/recipes/seq2seq.toml");
 const SEQ2SEQ_GRAMMAR: &str = include_str!("../../data/recipes/seq2seq-grammar.toml");
 
 impl Recipe {
-    /// The names of the built-in recipes for people; `tiny` is for tests.
+    /// The names of the built-in recipes for people. `tiny` is for tests, and `default-3` is not
+    /// finished.
     pub const BUILTIN: [&'static str; 6] =
         ["default-1", "default-2", "paper", "grammar", "seq2seq", "seq2seq-grammar"];
     /// The recipe that the name `default` means today. A new person or study gets it under its own
@@ -144,6 +152,7 @@ impl Recipe {
             "default" => Recipe::builtin(Recipe::DEFAULT),
             "default-1" => Some(DEFAULT_1),
             "default-2" => Some(DEFAULT_2),
+            "default-3" => Some(DEFAULT_3),
             "paper" => Some(PAPER),
             "tiny" => Some(TINY),
             "grammar" => Some(GRAMMAR),
@@ -159,8 +168,8 @@ impl Recipe {
     ///   out of range, or an unknown word table.
     pub fn parse(toml: &str) -> Result<Recipe, RecipeError> {
         // Most records carry a built-in recipe, and every session reads its own when it wakes.
-        const TEXTS: [&str; 7] =
-            [DEFAULT_1, DEFAULT_2, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
+        const TEXTS: [&str; 8] =
+            [DEFAULT_1, DEFAULT_2, DEFAULT_3, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
         static SHIPPED: [OnceLock<Recipe>; TEXTS.len()] = [const { OnceLock::new() }; TEXTS.len()];
         // Release 0.1 wrote `default-1` with the name `default`.
         static FORMER: LazyLock<String> =
@@ -188,8 +197,10 @@ impl Recipe {
             let start = error.span().map_or(0, |span| span.start);
             at(toml, start, error.message().trim().replace('\n', "; "))
         })?;
-        let RecipeFile { name, words, abstraction, lifting, execution, parser, reranker } = file;
-        let settings = RecipeSettings { words, abstraction, lifting, execution, parser, reranker };
+        let RecipeFile { name, words, abstraction, lifting, execution, parser, reranker, dialogue } =
+            file;
+        let settings =
+            RecipeSettings { words, abstraction, lifting, execution, parser, reranker, dialogue };
         check_name(&name).map_err(|reason| at(toml, locate(toml, "", "name"), reason))?;
         settings
             .check()
@@ -356,7 +367,7 @@ mod tests {
 
     #[test]
     fn the_recipes_that_ship_are_whole_and_differ() {
-        let names = Recipe::BUILTIN.into_iter().chain(["tiny"]);
+        let names = Recipe::BUILTIN.into_iter().chain(["tiny", "default-3"]);
         let digests: BTreeMap<Digest, &str> = names
             .clone()
             .map(|name| {

@@ -125,6 +125,8 @@ impl<'a> Player<'a> {
                 Ok(())
             }
             Kind::Act(Act::Forget(utterance)) => self.forget(utterance),
+            // What was meant is played, so nothing was done wrongly.
+            Kind::Act(Act::Wrong) => Ok(()),
             Kind::Remark | Kind::Answer(_) | Kind::Meant(_) => Ok(()),
         };
         result.map_err(|reason| Wrong { line: self.lines[index].number, reason })
@@ -258,7 +260,7 @@ impl<'a> Player<'a> {
             let answer = asked();
             let class = match answer.outcome {
                 Outcome::Understood { .. } => Class::WronglyActed,
-                Outcome::Impossible { .. } | Outcome::NotSure => Class::RightlyLeft,
+                _ => Class::RightlyLeft,
             };
             if answer.mentioned.is_some() {
                 episode.mentioned.clone_from(&answer.mentioned);
@@ -414,7 +416,9 @@ impl<'a> Goals<'a> {
                     false => (Class::Misread, None),
                 };
             }
-            Outcome::NotSure => return (Class::NotSure, None),
+            Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => {
+                return (Class::NotSure, None);
+            }
         };
         let mut way = path(household, scene, task, program, bindings);
         // Else a wrong answer could be taken for a right one that skipped something.
@@ -473,5 +477,7 @@ fn answered(answer: &Answer) -> String {
         }
         Outcome::Impossible { program, reason, .. } => format!("impossible: {program} ({reason})"),
         Outcome::NotSure => "not sure".to_owned(),
+        Outcome::Asked { question } => format!("asked: {}", question.text),
+        Outcome::Told { text } => format!("told: {text}"),
     }
 }

@@ -51,6 +51,10 @@ pub enum Heard {
     Impossible,
     #[default]
     NotSure,
+    /// The robot asked which was meant.
+    Asked,
+    /// It was a question, or needed no act.
+    Told,
 }
 
 impl From<&Outcome> for Heard {
@@ -59,6 +63,8 @@ impl From<&Outcome> for Heard {
             Outcome::Understood { .. } => Heard::Understood,
             Outcome::Impossible { .. } => Heard::Impossible,
             Outcome::NotSure => Heard::NotSure,
+            Outcome::Asked { .. } => Heard::Asked,
+            Outcome::Told { .. } => Heard::Told,
         }
     }
 }

@@ -224,7 +224,9 @@ impl<'a, T> Talk<'a, T> {
                             }
                         }
                         Outcome::Impossible { .. } => Heard::Impossible,
-                        Outcome::NotSure => Heard::NotSure,
+                        Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => {
+                            Heard::NotSure
+                        }
                     };
                     self.turns.push(Turn { seq: seq.get(), meant: meant.clone(), first });
                     let (after, settled) = (self.actions.len(), heard == Heard::Right);

@@ -167,7 +167,9 @@ impl Change {
             (Outcome::Understood { .. }, Outcome::Understood { .. })
             | (Outcome::Impossible { .. }, Outcome::Impossible { .. }) => Change::AnotherProgram,
             (_, Outcome::Understood { .. }) => Change::BecameUnderstood,
-            (_, Outcome::NotSure) => Change::BecameNotSure,
+            (_, Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. }) => {
+                Change::BecameNotSure
+            }
             (_, Outcome::Impossible { .. }) => Change::BecameImpossible,
         }
     }
@@ -292,7 +294,7 @@ impl Side {
         *match outcome {
             Outcome::Understood { .. } => &mut self.understood,
             Outcome::Impossible { .. } => &mut self.impossible,
-            Outcome::NotSure => &mut self.not_sure,
+            Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => &mut self.not_sure,
         } += 1;
     }
 }

@@ -221,6 +221,8 @@ fn said(outcome: &Outcome) -> String {
             format!("impossible at step {} of {program}: {reason}", step + 1)
         }
         Outcome::NotSure => "not sure".to_owned(),
+        Outcome::Asked { question } => question.text.clone(),
+        Outcome::Told { text } => text.clone(),
     }
 }
 

@@ -71,6 +71,6 @@ fn program(outcome: &Outcome) -> String {
         Outcome::Understood { program, .. } | Outcome::Impossible { program, .. } => {
             program.to_string()
         }
-        Outcome::NotSure => String::new(),
+        Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. } => String::new(),
     }
 }

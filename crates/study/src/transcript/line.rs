@@ -65,6 +65,8 @@ pub enum Act {
         actions: Option<(u32, u32)>,
         on_clash: OnClash,
     },
+    /// Marks the last act as wrong.
+    Wrong,
     /// Ends teaching and waits for the new mind; the number of examples is the answer.
     Learn {
         examples: Option<u32>,
@@ -78,6 +80,12 @@ pub enum Act {
 pub enum Answer {
     Understood(Program),
     NotSure,
+    /// It asked; the choices that it offered.
+    Asked(Vec<String>),
+    /// It answered a question, or said something. What it said is not compared.
+    Told,
+    /// The last act is marked as wrong.
+    Marked,
     /// The program and the failing step, counted from 1; none matches any.
     Impossible(Option<(Program, u32)>),
     /// The code of a rejection, as it stands on the wire.

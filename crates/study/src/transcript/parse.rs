@@ -15,7 +15,7 @@ pub struct SyntaxError {
 }
 
 const FIRST_WORDS: &str = "a line starts with user, recipe, scene, task, seed, episode, >, =, ?, \
-     !, x, ~~, achieved, teach, learn, forget, done or #";
+     !, ~, i, w, x, ~~, achieved, teach, learn, forget, wrong, done or #";
 
 impl Transcript {
     /// Reads the notation of `docs/transcripts.md`.
@@ -121,6 +121,20 @@ impl<'a> Cursor<'a> {
                 self.expect("sure")?;
                 self.end(Kind::Answer(Answer::NotSure))
             }
+            "~" => {
+                self.expect("asked")?;
+                let labels = self.until_bracket().split(',').map(|it| it.trim().to_owned());
+                Ok(Kind::Answer(Answer::Asked(labels.collect())))
+            }
+            "i" => {
+                self.expect("told")?;
+                self.end(Kind::Answer(Answer::Told))
+            }
+            "w" => {
+                self.expect("marked")?;
+                self.end(Kind::Answer(Answer::Marked))
+            }
+            "wrong" => self.end(Kind::Act(Act::Wrong)),
             "!" => self.impossible(),
             "x" => {
                 let code = self.name("the code of a rejection, such as wrong_phase")?;

@@ -138,6 +138,7 @@ impl<'a> Player<'a> {
                 let actions = actions.map(|(first, last)| run(first, last)).unwrap_or_default();
                 self.robot.teach(explains, actions, *on_clash)
             }
+            Act::Wrong => self.robot.mark_wrong(),
             Act::Learn { .. } => return self.learn(line),
             Act::Forget(utterance) => {
                 let lesson = self.lessons.iter().rev().find(|(_, taught)| taught == utterance);
@@ -214,6 +215,12 @@ impl<'a> Player<'a> {
                     if let Act::Teach { .. } = act {
                         played.act = Some(RealAct::Teach { line: format!("({program})") });
                     }
+                }
+                Told::MarkedWrong { act, .. } => {
+                    if let Some(said) = self.said.iter_mut().find(|said| said.seq == *act) {
+                        said.carried_out = false;
+                    }
+                    played.answers.push((Answer::Marked, "w marked".to_owned()));
                 }
                 Told::Declined { explains, .. } => self.settle(*explains),
                 Told::Forgotten { lesson, .. } => {
@@ -308,6 +315,13 @@ pub fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answer, Str
             let text = format!("! impossible {program} step {step} ({reason})");
             (Answer::Impossible(Some((program.clone(), step))), text)
         }
+        Outcome::Asked { question } => {
+            let labels: Vec<String> =
+                question.choices.iter().map(|choice| choice.label.clone()).collect();
+            let text = format!("~ asked {} ({})", labels.join(", "), question.text);
+            (Answer::Asked(labels), text)
+        }
+        Outcome::Told { text } => (Answer::Told, format!("i told ({text})")),
         Outcome::NotSure => {
             let remark = evidence.passed_over().or_else(|| nearest(evidence));
             let text = match remark {

@@ -17,6 +17,8 @@ pub fn answer(utterance: &str, answer: &Answer, done: &[ActionView]) -> Vec<Stri
         Outcome::Understood { .. } => done.iter().map(action).collect(),
         Outcome::Impossible { program, step, reason } => vec![impossible(program, *step, reason)],
         Outcome::NotSure => vec![not_sure(utterance, &answer.evidence)],
+        Outcome::Asked { question } => vec![question.text.clone()],
+        Outcome::Told { text } => vec![text.clone()],
     }
 }
 

@@ -11,6 +11,7 @@ If it does not understand you, do the task in small steps. You can teach it when
   :status    show the task, its goal and the actions so far
   :done      end this task now (done works too)
   :task T    choose the next task, for example :task clean Mug CounterTop
+  :wrong     say that the last thing it did is not what you meant; you can then teach it
   :forget N  forget the lesson that :known shows as #N
   :quit      leave; everything is saved";
     text.lines().map(str::to_owned).collect()

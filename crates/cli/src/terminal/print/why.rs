@@ -70,6 +70,8 @@ fn so(answer: &Answer) -> String {
         Outcome::Impossible { program, step, .. } => {
             format!("So I took it to mean {program}, but I can't do step {} here.", step + 1)
         }
+        Outcome::Asked { .. } => "So I asked. Nothing changed.".to_owned(),
+        Outcome::Told { .. } => "So I answered. Nothing changed.".to_owned(),
         Outcome::NotSure => match &answer.evidence.mood {
             Some(mood) => no_request(mood),
             None => "So I was not sure. Nothing changed.".to_owned(),

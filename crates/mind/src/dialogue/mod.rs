@@ -1,0 +1,32 @@
+//! What is said beside requests: answers to the robot's questions, "that was wrong", and questions
+//! about the scene and about what was taught. Nothing here moves the robot by itself.
+
+mod hearing;
+mod questions;
+mod replies;
+
+pub use hearing::{About, Heard};
+pub use questions::{Known, answer, in_words};
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+/// Which parts of a conversation a recipe has, and the words they are known by. All words are in
+/// lower case, without marks; entries may have several words.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dialogue {
+    /// Ask which is meant where a name fits things of several types here, unless recorded people meant
+    /// the nearest one in at least so many of 100 uses; 0 never asks.
+    pub which_below: u32,
+    /// Answer questions about the scene, the last act and the lessons.
+    pub questions: bool,
+    /// Whole utterances that accept what a question offers: "yes".
+    pub yes: BTreeSet<String>,
+    /// Whole utterances that refuse it. When nothing was asked they say that the last act was wrong:
+    /// "no".
+    pub no: BTreeSet<String>,
+    /// Whole utterances that say that the last act was wrong: "that was wrong".
+    pub wrong: BTreeSet<String>,
+}
