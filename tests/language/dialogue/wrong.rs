@@ -77,8 +77,7 @@ fn the_command_works_with_every_recipe_until_the_next_task() {
         let mut talk = Talk::with(recipe, KITCHEN, "place Mug SinkBasin");
         let refused = talk.0.give(&Command::MarkWrong).unwrap_err();
         assert_eq!(refused.code(), RejectionCode::NothingToMark, "{recipe}");
-        assert_eq!(talk.say("open the fridge").is_empty(), false);
-        talk.say("go to the fridge");
+        assert!(talk.say("go to the fridge").starts_with("GOTO Fridge"), "{recipe}");
         talk.0.accept(&Command::MarkWrong);
         let again = talk.0.give(&Command::MarkWrong).unwrap_err();
         assert_eq!(again.code(), RejectionCode::NothingToMark, "{recipe}: {again}");

@@ -78,13 +78,6 @@ pub enum Outcome {
     },
 }
 
-impl Outcome {
-    /// Whether nothing was carried out, and nothing would have been.
-    pub fn is_no_program(&self) -> bool {
-        matches!(self, Outcome::NotSure | Outcome::Asked { .. } | Outcome::Told { .. })
-    }
-}
-
 /// A question to the person. It is open until the next utterance, or until the episode ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Question {
