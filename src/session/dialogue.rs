@@ -8,6 +8,9 @@ use crate::ids::Seq;
 use crate::language::{Answer, Choice, Discarded, Evidence, Outcome, Utterance};
 use crate::world::Domain;
 
+/// Why a reading is not taken that the person called wrong, in [`Evidence::discarded`].
+pub const CALLED_WRONG: &str = "you said that this was wrong";
+
 /// What is to come of an utterance.
 pub(super) enum Said {
     /// The mind is asked.
@@ -67,7 +70,7 @@ pub(super) fn unless_wrong<S, T>(
     if !is_wrong {
         return answer;
     }
-    let reason = "you said that this was wrong".to_owned();
+    let reason = CALLED_WRONG.to_owned();
     let discarded = vec![Discarded { program: program.clone(), reason }];
     let evidence = Evidence { discarded, answered_by: Vec::new(), ..answer.evidence };
     Answer { outcome: Outcome::NotSure, evidence, chosen: Vec::new(), ..answer }

@@ -19,6 +19,7 @@ pub use crate::client::{
 };
 pub use apply::Divergence;
 pub use command::Command;
+pub use dialogue::CALLED_WRONG;
 pub use rejection::Rejection;
 pub use repeat::command_of;
 pub use reply::reply_of;

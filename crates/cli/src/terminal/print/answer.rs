@@ -2,6 +2,7 @@
 
 use apprentice::client::ActionView;
 use apprentice::language::{Answer, Evidence, Mood, Outcome, Program};
+use apprentice::session::CALLED_WRONG;
 use apprentice::world::household::told;
 
 use super::words::{quoted, unique, without_stop};
@@ -59,6 +60,12 @@ fn not_sure(utterance: &str, evidence: &Evidence) -> String {
         0..=QUOTED_CHARS_MAX => format!("\"{utterance}\""),
         _ => "that".to_owned(),
     };
+    if evidence.discarded.iter().any(|discarded| discarded.reason == CALLED_WRONG) {
+        return format!(
+            "You said that this was wrong, so I don't do it for {that} again in this task. Do it in \
+             small steps, then teach me."
+        );
+    }
     match evidence.nearest.first() {
         // Close enough, and still no program: a slot of it had no mention to fill it.
         Some(near) if near.distance <= evidence.threshold => format!(
@@ -103,7 +110,7 @@ pub(super) fn no_request(mood: &Mood) -> String {
 
 #[cfg(test)]
 mod tests {
-    use apprentice::language::Use;
+    use apprentice::language::{Discarded, Use};
 
     use super::super::samples::{accounting, answered, done};
     use super::super::why;
@@ -130,6 +137,15 @@ mod tests {
         );
         let lines = answer(&"boogie ".repeat(20), &answered(Outcome::NotSure), &[]);
         assert!(lines[0].starts_with("I don't understand that. Do it"), "{lines:?}");
+    }
+
+    #[test]
+    fn what_was_called_wrong_is_not_done_again_and_that_is_said() {
+        let mut told = answered(Outcome::NotSure);
+        let program = "GOTO Mug".parse().unwrap();
+        told.evidence.discarded = vec![Discarded { program, reason: CALLED_WRONG.to_owned() }];
+        let lines = answer("go to the mug", &told, &[]);
+        assert!(lines[0].starts_with("You said that this was wrong, so I don't do it for \"go to"));
     }
 
     #[test]
