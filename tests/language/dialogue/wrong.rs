@@ -108,6 +108,7 @@ fn words_about_nothing_are_one_plain_sentence() {
     let mut talk = talk();
     assert_eq!(talk.say("that was wrong"), "i I have done nothing in this task yet.");
     assert_eq!(talk.say("yes"), "i I did not ask anything.");
+    assert_eq!(talk.say("never mind"), "?", "it takes nothing back");
     assert_eq!(talk.say("go to the table"), "GOTO DiningTable");
     assert_eq!(talk.say("wrong"), "marked");
     let twice = talk.say("wrong");

@@ -78,7 +78,7 @@ impl Dialogue {
                 return Heard::Chose(place);
             }
         }
-        if refuses || self.wrong.contains(&text) {
+        if self.wrong.contains(&text) {
             return Heard::Wrong;
         }
         if accepts {

@@ -24,9 +24,9 @@ pub struct Dialogue {
     pub questions: bool,
     /// Whole utterances that accept what a question offers: "yes".
     pub yes: BTreeSet<String>,
-    /// Whole utterances that refuse it. When nothing was asked they say that the last act was wrong:
-    /// "no".
+    /// Whole utterances that refuse everything that a question offers: "no".
     pub no: BTreeSet<String>,
-    /// Whole utterances that say that the last act was wrong: "that was wrong".
+    /// Whole utterances that say that the last act was wrong: "that was wrong". A word that is in
+    /// `no` too refuses while a question is open.
     pub wrong: BTreeSet<String>,
 }
