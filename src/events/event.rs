@@ -164,7 +164,8 @@ pub struct RetrainFailed {
 /// A person said that what the robot did was not what they meant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MarkedWrong {
-    /// The [`Interpreted`] event whose program was not meant.
+    /// The [`Interpreted`] event of the utterance whose program was not meant. If the robot asked first,
+    /// the one with the question.
     pub act: Seq,
     /// The words that said so; none when it was a command.
     #[serde(default, skip_serializing_if = "Option::is_none")]

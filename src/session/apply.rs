@@ -4,9 +4,7 @@
 
 use std::sync::Arc;
 
-use super::state::{
-    Act, Action, Episode, LiveLesson, OpenQuestion, Opened, State, Unexplained, WrongReading,
-};
+use super::state::{Act, Action, Episode, LiveLesson, OpenQuestion, Opened, State, Unexplained};
 use crate::client::Phase;
 use crate::events::{
     DecompositionTaught, EpisodeEnded, EpisodeStarted, Event, Head, Interpreted, Record,
@@ -183,39 +181,13 @@ fn interpret<D: World>(
     };
     match &event.answer.outcome {
         Outcome::Understood { program, bindings } => {
-            // Nobody but the person knows whether a guess was right: wrong ones can be taught.
-            let unexplained_now = unexplained(false);
-            episode.unexplained.extend(guessed.then(|| unexplained_now.clone()));
-            let mut scene = D::Scene::clone(&episode.scene);
-            for (index, step) in program.steps.iter().enumerate() {
-                let on = event.answer.chosen_for(index);
-                let bound =
-                    domain.step_on(&mut scene, &episode.task, step, on).map_err(|error| {
-                        Divergence {
-                            seq,
-                            field: "a carried-out step",
-                            recorded: step.to_string(),
-                            recomputed: format!("infeasible: {error}"),
-                        }
-                    })?;
-                let recorded = bindings.get(index).cloned().unwrap_or_default();
-                agree(seq, "binding", recorded.join(", "), bound.join(", "))?;
-                episode.actions.push(Arc::new(Action { step: step.clone(), binding: bound }));
-            }
-            let said = match answered {
-                // The question's utterance was understood after all.
-                Some(asked) => take_unexplained(episode, asked),
-                None => None,
-            };
-            let said = said.unwrap_or_else(|| unexplained_now.clone());
-            if !program.steps.is_empty() {
-                let nearest = event.answer.evidence.nearest.first();
-                let taken_for = nearest.map(|near| near.exemplar.clone());
-                let program = program.clone();
-                let said = Unexplained { not_sure: false, ..Unexplained::clone(&said) };
-                episode.last_act = Some(Arc::new(Act { said, program, taken_for, wrong: false }));
-            }
-            episode.scene = Arc::new(scene);
+            let said = unexplained(false);
+            carry_out(domain, episode, seq, event, program, bindings)?;
+            // Only the person knows whether a guess was right: wrong ones can be taught.
+            episode.unexplained.extend(guessed.then(|| said.clone()));
+            // An answered question was understood after all.
+            let asked = answered.and_then(|asked| take_unexplained(episode, asked));
+            note_act(episode, event, program, asked.unwrap_or(said));
         }
         Outcome::Asked { question } => {
             let question = question.clone();
@@ -236,6 +208,49 @@ fn interpret<D: World>(
     agree(seq, SCENE, event.scene_after, domain.digest(&episode.scene))
 }
 
+/// Runs a program that was carried out, and compares what it acted on with the record.
+fn carry_out<D: World>(
+    domain: &D,
+    episode: &mut Episode<D::Scene, D::Task>,
+    seq: Seq,
+    event: &Interpreted,
+    program: &Program,
+    bindings: &[Vec<String>],
+) -> Result<(), Divergence> {
+    let mut scene = D::Scene::clone(&episode.scene);
+    for (index, step) in program.steps.iter().enumerate() {
+        let on = event.answer.chosen_for(index);
+        let bound = domain.step_on(&mut scene, &episode.task, step, on);
+        let bound = bound.map_err(|error| Divergence {
+            seq,
+            field: "a carried-out step",
+            recorded: step.to_string(),
+            recomputed: format!("infeasible: {error}"),
+        })?;
+        let recorded = bindings.get(index).cloned().unwrap_or_default();
+        agree(seq, "binding", recorded.join(", "), bound.join(", "))?;
+        episode.actions.push(Arc::new(Action { step: step.clone(), binding: bound }));
+    }
+    episode.scene = Arc::new(scene);
+    Ok(())
+}
+
+/// Remembers what was done last; a program without steps did nothing.
+fn note_act<S: Clone, T>(
+    episode: &mut Episode<S, T>,
+    event: &Interpreted,
+    program: &Program,
+    said: Arc<Unexplained<S>>,
+) {
+    if program.steps.is_empty() {
+        return;
+    }
+    let nearest = event.answer.evidence.nearest.first();
+    let taken_for = nearest.map(|near| near.exemplar.clone());
+    let said = Unexplained { not_sure: false, ..Unexplained::clone(&said) };
+    episode.last_act = Some(Arc::new(Act { said, program: program.clone(), taken_for }));
+}
+
 /// Takes the utterance of an answered question off what may be taught.
 fn take_unexplained<S, T>(episode: &mut Episode<S, T>, asked: Seq) -> Option<Arc<Unexplained<S>>> {
     let place = episode.unexplained.iter().position(|said| said.seq == asked)?;
@@ -244,12 +259,11 @@ fn take_unexplained<S, T>(episode: &mut Episode<S, T>, asked: Seq) -> Option<Arc
 
 fn mark_wrong<S: Clone, T>(state: &mut State<S, T>, seq: Seq, act: Seq) -> Result<(), Divergence> {
     let episode = state.episode.as_mut().ok_or_else(|| outside(seq, "an episode"))?;
-    let last = episode.last_act.as_mut().filter(|last| last.said.seq == act && !last.wrong);
-    let last = Arc::make_mut(last.ok_or_else(|| outside(seq, "an act that can be marked"))?);
-    last.wrong = true;
+    let last = episode.last_act.clone().filter(|last| last.said.seq == act);
+    let last = last.filter(|last| !episode.is_wrong(last));
+    let last = last.ok_or_else(|| outside(seq, "an act that can be marked"))?;
     let said = Arc::new(last.said.clone());
-    let utterance = said.utterance.clone();
-    episode.wrong.push(Arc::new(WrongReading { utterance, program: last.program.clone() }));
+    episode.wrong.push(last);
     if episode.unexplained.iter().all(|other| other.seq != said.seq) {
         let place = episode.unexplained.iter().take_while(|other| other.seq < said.seq).count();
         episode.unexplained.insert(place, said);

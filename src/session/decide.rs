@@ -2,7 +2,7 @@
 //! nothing; the proposed events become true when the log has them.
 
 use super::apply::apply_event;
-use super::dialogue::{self, Said};
+use super::dialogue::{self, Decided};
 use super::state::{Episode, State, Unexplained};
 use super::{Command, Divergence, Rejection, Session};
 use crate::client::{OnClash, Phase};
@@ -184,12 +184,12 @@ fn say<D: Domain>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
         mentioned: episode.mentioned.as_ref(),
         handled: &handled,
     };
-    let answer = match dialogue::hear(session, episode, &utterance) {
-        Said::Request => {
+    let answer = match dialogue::decide(session, episode, &utterance) {
+        Decided::Interpret => {
             dialogue::unless_wrong(episode, &utterance, mind.interpret(moment, &utterance))
         }
-        Said::Wrong => return mark_wrong(draft, Some(utterance)),
-        Said::Answer(answer) => *answer,
+        Decided::MarkWrong => return mark_wrong(draft, Some(utterance)),
+        Decided::Answer(answer) => *answer,
     };
 
     let mut scene = D::Scene::clone(&episode.scene);
@@ -219,7 +219,7 @@ fn say<D: Domain>(draft: &mut Draft<D>, text: &str) -> Result<(), Refusal> {
 fn mark_wrong<D: World>(draft: &mut Draft<D>, utterance: Option<Utterance>) -> Result<(), Refusal> {
     let episode = draft.state.episode.as_ref().ok_or(Rejection::NothingToMark)?;
     let last = episode.last_act.as_ref().ok_or(Rejection::NothingToMark)?;
-    if last.wrong {
+    if episode.is_wrong(last) {
         let utterance = last.said.utterance.to_string();
         return Err(Rejection::MarkedAlready { utterance }.into());
     }

@@ -2,56 +2,53 @@
 //! question, "that was wrong", or a question of the person.
 
 use super::Session;
-use super::state::{Act, Episode, OpenQuestion};
-use crate::dialogue::{self, About, Heard, Known};
+use super::state::{Act, Episode};
+use crate::dialogue::{self, About, Intent, Known};
 use crate::ids::Seq;
-use crate::language::{Answer, Choice, Discarded, Evidence, Outcome, Utterance};
+use crate::language::{Answer, AnswerOption, Discarded, Evidence, Outcome, Utterance};
 use crate::world::Domain;
 
 /// Why a reading is not taken that the person called wrong, in [`Evidence::discarded`].
 pub const CALLED_WRONG: &str = "you said that this was wrong";
 
 /// What is to come of an utterance.
-pub(super) enum Said {
-    /// The mind is asked.
-    Request,
+pub(super) enum Decided {
+    /// The mind is asked what it means.
+    Interpret,
     /// The last act is marked as wrong.
-    Wrong,
+    MarkWrong,
     /// This answer, whatever the mind would say.
     Answer(Box<Answer>),
 }
 
 /// Reads an utterance as a part of the conversation, where the recipe has one.
-pub(super) fn hear<D: Domain>(
+pub(super) fn decide<D: Domain>(
     session: &Session<D>,
     episode: &Episode<D::Scene, D::Task>,
     utterance: &Utterance,
-) -> Said {
+) -> Decided {
     let settings = session.recipe().settings();
-    let Some(dialogue) = &settings.dialogue else { return Said::Request };
-    let lexicon = session.domain.lexicon(settings.words.edition);
+    let Some(dialogue) = &settings.dialogue else { return Decided::Interpret };
+    let domain = &*session.domain;
+    let lexicon = domain.lexicon(settings.words.edition);
+    let lists = settings.abstraction.lists.as_ref();
     let open = episode.question.as_deref();
-    match dialogue.hear(utterance, open.map(|open| &open.question), lexicon) {
-        Heard::Request => Said::Request,
-        Heard::Chose(place) => match open {
-            Some(open) => Said::Answer(Box::new(carry_out(session, episode, open, place))),
-            None => Said::Request,
-        },
-        Heard::Refused => {
-            let text = "All right. Do it in small steps, then teach me.";
-            told(text, open.map(|open| open.seq))
-        }
-        Heard::NothingAsked => told("I did not ask anything.", None),
-        Heard::Wrong => match episode.last_act.as_deref() {
+    let question = open.map(|open| &open.question);
+    let replies_to = open.map(|open| open.seq);
+    match dialogue.read(domain, lexicon, lists, utterance, question) {
+        Intent::Request => Decided::Interpret,
+        Intent::Chose(option) => chosen(option, replies_to),
+        Intent::Refused => told("All right. Do it in small steps, then teach me.", replies_to),
+        Intent::NothingAsked => told("I did not ask anything.", None),
+        Intent::Wrong => match episode.last_act.as_deref() {
             None => told("I have done nothing in this task yet.", None),
-            Some(last) if last.wrong => {
-                let text =
-                    format!("What I did for \"{}\" is marked as wrong.", last.said.utterance);
-                told(&text, None)
-            }
-            Some(_) => Said::Wrong,
+            Some(act) if episode.is_wrong(act) => told(
+                &format!("What I did for \"{}\" is marked as wrong.", act.said.utterance),
+                None,
+            ),
+            Some(_) => Decided::MarkWrong,
         },
-        Heard::Question(about) => told(&answer(session, episode, &about), None),
+        Intent::Question(about) => told(&answer(session, episode, &about), None),
     }
 }
 
@@ -66,7 +63,7 @@ pub(super) fn unless_wrong<S, T>(
     let is_wrong = episode
         .wrong
         .iter()
-        .any(|wrong| wrong.program == *program && wrong.utterance.tokens() == words);
+        .any(|act| act.program == *program && act.said.utterance.tokens() == words);
     if !is_wrong {
         return answer;
     }
@@ -76,38 +73,19 @@ pub(super) fn unless_wrong<S, T>(
     Answer { outcome: Outcome::NotSure, evidence, chosen: Vec::new(), ..answer }
 }
 
-/// Carries out what the person chose.
-fn carry_out<D: Domain>(
-    session: &Session<D>,
-    episode: &Episode<D::Scene, D::Task>,
-    open: &OpenQuestion,
-    place: usize,
-) -> Answer {
-    let Choice { program, chosen, mentioned, .. } = open.question.choices[place].clone();
-    let mut scene = D::Scene::clone(&episode.scene);
-    let mut bindings = Vec::new();
-    let mut outcome = None;
-    for (index, step) in program.steps.iter().enumerate() {
-        let on = chosen.get(index).map_or(&[][..], Vec::as_slice);
-        match session.domain.step_on(&mut scene, &episode.task, step, on) {
-            Ok(bound) => bindings.push(bound),
-            Err(error) => {
-                let (program, step) = (program.clone(), index as u32);
-                let reason = error.reason;
-                outcome = Some(Outcome::Impossible { program, step, reason });
-                break;
-            }
-        }
-    }
-    let outcome = outcome.unwrap_or(Outcome::Understood { program, bindings });
-    let evidence = Evidence { replies_to: Some(open.seq), ..Evidence::default() };
-    Answer { outcome, evidence, mentioned, chosen }
+/// What the person chose. The scene is that in which it was offered: an open question is answered by
+/// the next utterance alone.
+fn chosen(option: AnswerOption, replies_to: Option<Seq>) -> Decided {
+    let AnswerOption { program, bindings, chosen, mentioned, .. } = option;
+    let outcome = Outcome::Understood { program, bindings };
+    let evidence = Evidence { replies_to, ..Evidence::default() };
+    Decided::Answer(Box::new(Answer { outcome, evidence, mentioned, chosen }))
 }
 
-fn told(text: &str, replies_to: Option<Seq>) -> Said {
+fn told(text: &str, replies_to: Option<Seq>) -> Decided {
     let outcome = Outcome::Told { text: text.to_owned() };
     let evidence = Evidence { replies_to, ..Evidence::default() };
-    Said::Answer(Box::new(Answer { outcome, evidence, mentioned: None, chosen: Vec::new() }))
+    Decided::Answer(Box::new(Answer { outcome, evidence, mentioned: None, chosen: Vec::new() }))
 }
 
 fn answer<D: Domain>(

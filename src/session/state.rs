@@ -66,9 +66,10 @@ pub struct Episode<S, T> {
     /// The question that the next utterance may answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub question: Option<Arc<OpenQuestion>>,
-    /// Readings that the person called wrong.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub wrong: Vec<Arc<WrongReading>>,
+    /// Acts that the person called wrong. The same words are not taken for the same program again in
+    /// this episode.
+    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
+    pub wrong: Vec<Arc<Act<S>>>,
 }
 
 fn none<T>() -> Option<T> {
@@ -83,8 +84,6 @@ pub struct Act<S> {
     pub program: Program,
     /// The request that the words were taken for.
     pub taken_for: Option<LiftedUtterance>,
-    /// Whether the person has called it wrong.
-    pub wrong: bool,
 }
 
 /// A question to the person, and the record that asks it.
@@ -94,14 +93,12 @@ pub struct OpenQuestion {
     pub question: Question,
 }
 
-/// What an utterance was taken for, wrongly. It is not taken for it again in this episode.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct WrongReading {
-    pub utterance: Utterance,
-    pub program: Program,
-}
-
 impl<S, T> Episode<S, T> {
+    /// Whether the person has called an act wrong.
+    pub fn is_wrong(&self, act: &Act<S>) -> bool {
+        self.wrong.iter().any(|wrong| wrong.said.seq == act.said.seq)
+    }
+
     /// The names of the things that were acted on, newest first; one may come again.
     pub fn handled(&self) -> Vec<String> {
         self.actions.iter().rev().flat_map(|action| action.binding.iter().rev()).cloned().collect()

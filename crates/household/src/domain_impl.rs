@@ -220,6 +220,10 @@ impl Words for Household {
         StateWord::read(word).is_some()
     }
 
+    fn is_as(&self, scene: &Scene, thing: &str, word: &str) -> Option<bool> {
+        StateWord::read(word)?.holds(scene, scene.named(thing)?)
+    }
+
     fn called(&self, name: &str) -> String {
         view::said(name)
     }

@@ -10,8 +10,8 @@ use apprentice::events::{
 };
 use apprentice::ids::{Digest, PublicKey, Seq, Signature, StreamKey, Timestamp, UserId};
 use apprentice::language::{
-    Accounted, Answer, Answerer, Choice, Discarded, Document, Evidence, LiftedUtterance, Mood,
-    Near, Outcome, Program, Question, Symbol, Use, Utterance,
+    Accounted, Answer, AnswerOption, Answerer, Discarded, Document, Evidence, LiftedUtterance,
+    Mood, Near, Outcome, Program, Question, Symbol, Use, Utterance,
 };
 use serde_json::json;
 
@@ -30,7 +30,7 @@ pub fn samples() -> Vec<(&'static str, Event)> {
         ("interpreted_left_over", Event::Interpreted(left_over())),
         ("interpreted_asked", Event::Interpreted(asked())),
         ("interpreted_told", Event::Interpreted(told())),
-        ("interpreted_choice", Event::Interpreted(choice())),
+        ("interpreted_option", Event::Interpreted(option())),
         ("episode_ended", Event::EpisodeEnded(episode_ended(Ending::Achieved))),
         ("episode_ended_abandoned", Event::EpisodeEnded(episode_ended(Ending::Abandoned))),
         ("decomposition_taught", Event::DecompositionTaught(taught())),
@@ -95,10 +95,14 @@ pub const MEANINGS: &[(&str, &str)] = &[
         "the word that forbids; likewise asked, told, conditional, later, reordered; absent: a request",
     ),
     ("interpreted.answer.outcome.asked.question.text", "the question to the person"),
-    ("interpreted.answer.outcome.asked.question.choices[].label", "an answer that it offers"),
-    ("interpreted.answer.outcome.asked.question.choices[].program", "what that answer leads to"),
+    ("interpreted.answer.outcome.asked.question.options[].label", "an answer that it offers"),
+    ("interpreted.answer.outcome.asked.question.options[].program", "what that answer leads to"),
     (
-        "interpreted.answer.outcome.asked.question.choices[].mentioned",
+        "interpreted.answer.outcome.asked.question.options[].bindings[][]",
+        "per step the things that it acts on",
+    ),
+    (
+        "interpreted.answer.outcome.asked.question.options[].mentioned",
         "the type that the program is about, for a later \"it\"",
     ),
     ("interpreted.answer.outcome.told.text", "what the robot said"),
@@ -381,17 +385,18 @@ fn failed() -> RetrainFailed {
 }
 
 fn asked() -> Interpreted {
-    let choice = |label: &str, kind: &str| Choice {
+    let option = |label: &str, kind: &str| AnswerOption {
         label: label.to_owned(),
         program: format!("GOTO {kind}").parse().unwrap(),
+        bindings: vec![vec![kind.to_owned()]],
         chosen: Vec::new(),
         mentioned: Some(Symbol::new(kind)),
     };
     let question = Question {
         text: "Which table: the dining table or the side table?".to_owned(),
-        choices: vec![
-            choice("the dining table", "DiningTable"),
-            choice("the side table", "SideTable"),
+        options: vec![
+            option("the dining table", "DiningTable"),
+            option("the side table", "SideTable"),
         ],
     };
     let mut event = interpreted(Outcome::Asked { question });
@@ -414,7 +419,7 @@ fn told() -> Interpreted {
     event
 }
 
-fn choice() -> Interpreted {
+fn option() -> Interpreted {
     let program = "GOTO SideTable".parse().unwrap();
     let bindings = vec![vec!["SideTable".to_owned()]];
     let mut event = interpreted(Outcome::Understood { program, bindings });

@@ -255,6 +255,10 @@ impl Words for Bells {
         false
     }
 
+    fn is_as(&self, _: &Ringing, _: &str, _: &str) -> Option<bool> {
+        None
+    }
+
     fn called(&self, name: &str) -> String {
         name.to_lowercase()
     }

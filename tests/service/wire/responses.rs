@@ -11,8 +11,8 @@ use apprentice::client::{
 use apprentice::events::{Ending, PersonErased, Report};
 use apprentice::ids::{Digest, RequestId, Signature, StreamKey, Timestamp};
 use apprentice::language::{
-    Accounted, Answer, Choice, Discarded, Evidence, Exemplar, LiftedUtterance, Mood, Near, Outcome,
-    Question, Symbol, Use,
+    Accounted, Answer, AnswerOption, Discarded, Evidence, Exemplar, LiftedUtterance, Mood, Near,
+    Outcome, Question, Symbol, Use,
 };
 use apprentice::tenancy::Role;
 use apprentice::world::{Thing, View};
@@ -318,16 +318,17 @@ fn chosen() -> Response {
 }
 
 fn asked_which() -> Response {
-    let choice = |label: &str, kind: &str| Choice {
+    let option = |label: &str, kind: &str| AnswerOption {
         label: label.to_owned(),
         program: format!("GOTO {kind}").parse().unwrap(),
+        bindings: vec![vec![kind.to_owned()]],
         chosen: Vec::new(),
         mentioned: Some(Symbol::new(kind)),
     };
     let text = "Which table: the dining table or the side table?".to_owned();
-    let choices =
-        vec![choice("the dining table", "DiningTable"), choice("the side table", "SideTable")];
-    let outcome = Outcome::Asked { question: Question { text, choices } };
+    let options =
+        vec![option("the dining table", "DiningTable"), option("the side table", "SideTable")];
+    let outcome = Outcome::Asked { question: Question { text, options } };
     told("go to the table", outcome, Evidence::default(), Vec::new())
 }
 

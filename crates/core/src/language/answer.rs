@@ -83,17 +83,19 @@ pub enum Outcome {
 pub struct Question {
     /// `Which table: the dining table or the side table?`
     pub text: String,
-    /// What the person may choose from, in the order of the text. One choice is a yes-or-no question.
-    pub choices: Vec<Choice>,
+    /// What the person may choose from, in the order of the text. One option is a yes-or-no question.
+    pub options: Vec<AnswerOption>,
 }
 
 /// One answer that a [`Question`] offers, and what is done when the person gives it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Choice {
+pub struct AnswerOption {
     /// As it stands in the question: `the dining table`.
     pub label: String,
     /// What is carried out.
     pub program: Program,
+    /// The things that each step acts on, as in [`Outcome::Understood`].
+    pub bindings: Vec<Vec<String>>,
     /// As [`Answer::chosen`], for this program.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub chosen: Vec<Vec<Option<String>>>,

@@ -15,7 +15,8 @@ mod symbol;
 mod utterance;
 
 pub use answer::{
-    Accounted, Answer, Answerer, Choice, Discarded, Evidence, Mood, Near, Outcome, Question, Use,
+    Accounted, Answer, AnswerOption, Answerer, Discarded, Evidence, Mood, Near, Outcome, Question,
+    Use,
 };
 pub use clause::Clause;
 pub use document::Document;

@@ -73,6 +73,13 @@ pub trait Words: World {
     /// word that stands between an article and the name.
     fn is_instance_word(&self, word: &str) -> bool;
 
+    /// Whether a thing is as a word says: "open", "clean".
+    ///
+    /// - `thing`: its name, as a [`Thing`](super::Thing) shows it.
+    /// - returns: none when that is not known, as of a shelf that is to be open, and for a word that
+    ///   names no state.
+    fn is_as(&self, scene: &Self::Scene, thing: &str, word: &str) -> Option<bool>;
+
     /// A thing's or a type's name in a person's words: `CounterTop 2` → `counter top 2`.
     fn called(&self, name: &str) -> String;
 

@@ -1,11 +1,11 @@
 //! What is said beside requests: answers to the robot's questions, "that was wrong", and questions
 //! about the scene and about what was taught. Nothing here moves the robot by itself.
 
-mod hearing;
+mod intent;
 mod questions;
 mod replies;
 
-pub use hearing::{About, Heard};
+pub use intent::{About, Intent};
 pub use questions::{Known, answer, in_words};
 
 use std::collections::BTreeSet;

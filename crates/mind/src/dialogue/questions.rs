@@ -1,30 +1,14 @@
 //! Questions about the scene and about the robot: how they are known, and what is answered.
 
-use super::hearing::{About, Named};
+use super::intent::{About, Named};
 use crate::grounding::{Names, listed};
-use crate::language::{Exemplar, LiftedUtterance, Mention, Symbol, Word};
-use crate::world::{Domain, Lexicon, Thing, View};
+use crate::language::{Exemplar, LiftedUtterance, Mention, Symbol, Word, WordLists};
+use crate::world::{Domain, Lexicon, Thing, View, Words};
 
-/// Words before the name of a thing.
-const DETERMINERS: [&str; 12] =
-    ["the", "a", "an", "any", "some", "my", "your", "our", "this", "that", "these", "those"];
 /// Words by which a thing is in or on another one.
 const WITHIN: [&str; 6] = ["in", "on", "inside", "into", "at", "within"];
-/// Words that say how a thing is, and the state of a [`Thing`] that makes them true, or false.
-const STATES: [(&str, &str, bool); 12] = [
-    ("open", "open", true),
-    ("opened", "open", true),
-    ("closed", "open", false),
-    ("shut", "open", false),
-    ("on", "on", true),
-    ("off", "on", false),
-    ("dirty", "dirty", true),
-    ("clean", "dirty", false),
-    ("hot", "hot", true),
-    ("warm", "hot", true),
-    ("cold", "cold", true),
-    ("cool", "cold", true),
-];
+/// Words that are left out before "something".
+const ARTICLES: [&str; 3] = ["the", "a", "an"];
 
 /// What an answer may draw on beside the scene.
 #[derive(Debug, Clone, Copy)]
@@ -44,10 +28,16 @@ pub struct Known<'a> {
 /// What an utterance asks about, if it is a question that can be answered.
 ///
 /// - `words`: in lower case, without marks.
-pub(super) fn about(words: &[&str], lexicon: &Lexicon) -> Option<About> {
+/// - `lists`: the recipe's.
+pub(super) fn about<D: Words>(
+    domain: &D,
+    lexicon: &Lexicon,
+    lists: &WordLists,
+    words: &[&str],
+) -> Option<About> {
     let words = without_openers(words);
     let words: Vec<&str> = words.iter().flat_map(|word| contraction(word)).collect();
-    let reader = Reader { names: Names::new(lexicon), words: &words };
+    let reader = Reader { domain, names: Names::new(lexicon), lists, words: &words };
     let (first, second) = (*words.first()?, words.get(1).copied().unwrap_or_default());
     let has = |any: &[&str]| words.iter().any(|word| any.contains(word));
     let you = has(&["you", "your"]);
@@ -127,17 +117,21 @@ fn contraction(word: &str) -> impl Iterator<Item = &str> {
     [Some(word), rest].into_iter().flatten()
 }
 
-struct Reader<'a> {
+struct Reader<'a, D> {
+    domain: &'a D,
     names: Names<'a>,
+    lists: &'a WordLists,
     words: &'a [&'a str],
 }
 
-impl Reader<'_> {
+impl<D: Words> Reader<'_, D> {
     /// The thing that is named at a place, and where the words behind it begin. What has no name that
     /// is known is the words up to the next one that says where or how.
     fn named_at(&self, at: usize) -> Option<(usize, Named)> {
-        let determiners =
-            self.words[at..].iter().take_while(|word| DETERMINERS.contains(word)).count();
+        let determiners = self.words[at..]
+            .iter()
+            .take_while(|&&word| self.lists.determiners.contains(word))
+            .count();
         let at = at + determiners;
         if let Some((count, mention)) = self.names.starting(&self.words[at..])
             && !mention.pronoun
@@ -188,7 +182,7 @@ impl Reader<'_> {
     fn state(&self) -> Option<About> {
         let (end, named) = self.named_at(1)?;
         match &self.words[end..] {
-            [word] if STATES.iter().any(|(state, ..)| state == word) => {
+            [word] if self.domain.is_instance_word(word) => {
                 Some(About::State(named, (*word).to_owned()))
             }
             [word, ..] if WITHIN.contains(word) => {
@@ -200,7 +194,7 @@ impl Reader<'_> {
                 // "Is the dirty light bulb …": the words behind an unknown name are part of it.
                 Named::Unknown(words) => {
                     let (thing, word) = words.rsplit_once(' ')?;
-                    let is_state = STATES.iter().any(|(state, ..)| *state == word);
+                    let is_state = self.domain.is_instance_word(word);
                     is_state
                         .then(|| About::State(Named::Unknown(thing.to_owned()), word.to_owned()))
                 }
@@ -219,7 +213,10 @@ pub fn answer<D: Domain>(domain: &D, scene: &D::Scene, about: &About, known: Kno
         About::Presence(named) => teller.presence(named),
         About::Count(named) => teller.count(named),
         About::Contents(named) => teller.all_of(named, |thing| teller.contents(thing)),
-        About::State(named, word) => teller.all_of(named, |thing| teller.state(thing, word)),
+        About::State(named, word) => {
+            let is = |thing: &Thing| domain.is_as(scene, &thing.name, word).unwrap_or(false);
+            teller.all_of(named, |thing| teller.state(thing, word, is(thing)))
+        }
         About::Within(thing, place) => teller.within(thing, place),
         About::Hand(named) => teller.hand(named.as_ref()),
         About::Robot => teller.robot(),
@@ -301,10 +298,8 @@ impl<D: Domain> Teller<'_, D> {
         }
     }
 
-    fn state(&self, thing: &Thing, word: &str) -> String {
+    fn state(&self, thing: &Thing, word: &str, holds: bool) -> String {
         let name = self.the(&thing.name);
-        let found = STATES.iter().find(|(state, ..)| *state == word);
-        let holds = found.is_some_and(|(_, state, wanted)| is(thing, state) == *wanted);
         match holds {
             true => format!("yes, {name} is {word}"),
             false => format!("no, {name} is not {word}"),
@@ -434,7 +429,7 @@ pub fn in_words(lifted: &LiftedUtterance) -> String {
         match word {
             Word::Text(text) => words.push(text),
             Word::Slot { .. } => {
-                words.pop_if(|before| DETERMINERS.contains(before));
+                words.pop_if(|before| ARTICLES.contains(before));
                 words.push("something");
             }
         }

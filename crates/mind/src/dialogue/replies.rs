@@ -1,8 +1,8 @@
-//! Which choice of a question an utterance takes.
+//! Which option of a question an utterance takes.
 
 use crate::language::{Question, tokens};
 
-/// Words of a reply that say nothing of which choice it is.
+/// Words of a reply that say nothing of which option it is.
 const EMPTY: [&str; 12] =
     ["the", "a", "an", "one", "that", "i", "meant", "mean", "please", "of", "them", "number"];
 /// By place. "One" alone is a number; behind another word it is not.
@@ -16,10 +16,10 @@ const NUMBERS: [[&str; 3]; 6] = [
 ];
 
 /// - `accepts`: whether the words are a yes.
-/// - returns: the 0-based place of the choice; none when the words take none of them, or fit several.
+/// - returns: the 0-based place of the option; none when the words take none of them, or fit several.
 pub(super) fn chosen(question: &Question, words: &[&str], accepts: bool) -> Option<usize> {
     if accepts {
-        return (question.choices.len() == 1).then_some(0);
+        return (question.options.len() == 1).then_some(0);
     }
     let telling: Vec<&str> = words.iter().filter(|word| !EMPTY.contains(word)).copied().collect();
     let number = match (&telling[..], words) {
@@ -27,7 +27,7 @@ pub(super) fn chosen(question: &Question, words: &[&str], accepts: bool) -> Opti
         ([], [.., last]) => NUMBERS.iter().position(|names| names.contains(last)),
         _ => None,
     };
-    if let Some(place) = number.filter(|place| *place < question.choices.len()) {
+    if let Some(place) = number.filter(|place| *place < question.options.len()) {
         return Some(place);
     }
     if telling.is_empty() {
@@ -37,7 +37,7 @@ pub(super) fn chosen(question: &Question, words: &[&str], accepts: bool) -> Opti
         let label = tokens(label);
         telling.iter().all(|word| label.iter().any(|other| other == word))
     };
-    let mut fitting = question.choices.iter().enumerate().filter(|(_, it)| fits(&it.label));
+    let mut fitting = question.options.iter().enumerate().filter(|(_, it)| fits(&it.label));
     match (fitting.next(), fitting.next()) {
         (Some((place, _)), None) => Some(place),
         _ => None,
@@ -47,16 +47,17 @@ pub(super) fn chosen(question: &Question, words: &[&str], accepts: bool) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::{Choice, Program};
+    use crate::language::{AnswerOption, Program};
 
     fn question(labels: &[&str]) -> Question {
-        let choice = |label: &&str| Choice {
+        let option = |label: &&str| AnswerOption {
             label: (*label).to_owned(),
             program: Program { steps: Vec::new() },
+            bindings: Vec::new(),
             chosen: Vec::new(),
             mentioned: None,
         };
-        Question { text: String::new(), choices: labels.iter().map(choice).collect() }
+        Question { text: String::new(), options: labels.iter().map(option).collect() }
     }
 
     fn chosen_by(question: &Question, said: &str) -> Option<usize> {

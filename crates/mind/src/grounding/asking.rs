@@ -1,11 +1,11 @@
 //! When a reading is not taken but asked about.
 
 use super::{Candidate, Moment};
-use crate::language::{Choice, Mention, Program, Question, Symbol};
+use crate::language::{AnswerOption, Mention, Program, Question, Symbol};
 use crate::world::{Edition, Lexicon, Words};
 
-/// How many choices a question offers at most; with more, it is no help.
-const CHOICES_MAX: usize = 4;
+/// How many options a question offers at most; with more, it is no help.
+const OPTIONS_MAX: usize = 4;
 
 /// What is known when a reading is about to be taken.
 pub(super) struct Taken<'a, D: Words> {
@@ -27,15 +27,15 @@ pub(super) struct Taken<'a, D: Words> {
 /// - returns: none when one type fits, when the words or the episode say which, or too many fit.
 pub(super) fn which<D: Words>(taken: &Taken<'_, D>, below: u32) -> Option<Question> {
     taken.mentions.iter().filter(|mention| !mention.pronoun).find_map(|mention| {
-        let choices = taken.choices(mention, below)?;
-        let labels: Vec<&str> = choices.iter().map(|choice| choice.label.as_str()).collect();
+        let options = taken.options(mention, below)?;
+        let labels: Vec<&str> = options.iter().map(|option| option.label.as_str()).collect();
         let text = format!("Which {}: {}?", mention.surface, listed(&labels, "or"));
-        Some(Question { text, choices })
+        Some(Question { text, options })
     })
 }
 
 impl<D: Words> Taken<'_, D> {
-    fn choices(&self, mention: &Mention, below: u32) -> Option<Vec<Choice>> {
+    fn options(&self, mention: &Mention, below: u32) -> Option<Vec<AnswerOption>> {
         let Moment { domain, scene, .. } = *self.moment;
         let lexicon = domain.lexicon(self.edition);
         let kinds = domain.resolve(self.edition, scene, mention);
@@ -47,16 +47,14 @@ impl<D: Words> Taken<'_, D> {
         let others = kinds
             .iter()
             .filter(|&kind| kind != used && !lexicon.rarely_means(&mention.surface, kind));
-        let mut choices = vec![self.choice(used, self.candidate.program.clone())];
-        for other in others {
-            let program = with(&self.candidate.program, used, other);
-            if self.runs(&program) {
-                choices.push(self.choice(other, program));
-            }
-        }
-        let fits = (2..=CHOICES_MAX).contains(&choices.len());
+        let programs = others.map(|other| (other, with(&self.candidate.program, used, other)));
+        let first = std::iter::once((used, self.candidate.program.clone()));
+        let options = first.chain(programs);
+        let options: Vec<AnswerOption> =
+            options.filter_map(|(kind, program)| self.option(kind, program)).collect();
+        let fits = (2..=OPTIONS_MAX).contains(&options.len());
         let share = share(lexicon, &mention.surface, used, &kinds);
-        (fits && share.is_none_or(|share| share < below)).then_some(choices)
+        (fits && share.is_none_or(|share| share < below)).then_some(options)
     }
 
     /// Whether words chose the thing, or it was acted on before: then it is meant again.
@@ -68,22 +66,19 @@ impl<D: Words> Taken<'_, D> {
             || self.moment.mentioned == Some(kind)
     }
 
-    fn choice(&self, kind: &Symbol, program: Program) -> Choice {
-        Choice {
-            label: format!("the {}", self.moment.domain.called(kind.as_str())),
-            program,
-            chosen: self.candidate.chosen(),
-            mentioned: Some(kind.clone()),
-        }
-    }
-
-    fn runs(&self, program: &Program) -> bool {
+    /// - returns: none when the program does not run.
+    fn option(&self, kind: &Symbol, program: Program) -> Option<AnswerOption> {
         let Moment { domain, scene, task, .. } = *self.moment;
         let (mut scene, chosen) = (scene.clone(), self.candidate.chosen());
-        program.steps.iter().enumerate().all(|(index, step)| {
+        let steps = program.steps.iter().enumerate();
+        let bindings = steps.map(|(index, step)| {
             let on = chosen.get(index).map_or(&[][..], Vec::as_slice);
-            domain.step_on(&mut scene, task, step, on).is_ok()
-        })
+            domain.step_on(&mut scene, task, step, on).ok()
+        });
+        let bindings = bindings.collect::<Option<_>>()?;
+        let label = format!("the {}", domain.called(kind.as_str()));
+        let mentioned = Some(kind.clone());
+        Some(AnswerOption { label, program, bindings, chosen, mentioned })
     }
 }
 

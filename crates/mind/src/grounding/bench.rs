@@ -219,6 +219,10 @@ impl Words for Bench {
         false
     }
 
+    fn is_as(&self, _: &Scene, _: &str, _: &str) -> Option<bool> {
+        None
+    }
+
     fn called(&self, name: &str) -> String {
         name.to_lowercase()
     }

@@ -129,7 +129,11 @@ pub struct RecipeError {
 const PAPER: &str = include_str!("../../data/recipes/paper.toml");
 const DEFAULT_1: &str = include_str!("../../data/recipes/default-1.toml");
 const DEFAULT_2: &str = include_str!("../../data/recipes/default-2.toml");
-const DEFAULT_3: &str = include_str!("../../data/recipes/default-3.toml");
+/// `default-2` and a conversation.
+static DEFAULT_3: LazyLock<String> = LazyLock::new(|| {
+    let dialogue = include_str!("../../data/recipes/dialogue.toml");
+    format!("{}\n{dialogue}", DEFAULT_2.replacen("\"default-2\"", "\"default-3\"", 1))
+});
 /// Trains in a few milliseconds, for tests and simulations.
 const TINY: &str = include_str!("../../data/recipes/tiny.toml");
 // The paper's baseline, and its two halves alone.
@@ -152,7 +156,7 @@ impl Recipe {
             "default" => Recipe::builtin(Recipe::DEFAULT),
             "default-1" => Some(DEFAULT_1),
             "default-2" => Some(DEFAULT_2),
-            "default-3" => Some(DEFAULT_3),
+            "default-3" => Some(&DEFAULT_3),
             "paper" => Some(PAPER),
             "tiny" => Some(TINY),
             "grammar" => Some(GRAMMAR),
@@ -168,28 +172,22 @@ impl Recipe {
     ///   out of range, or an unknown word table.
     pub fn parse(toml: &str) -> Result<Recipe, RecipeError> {
         // Most records carry a built-in recipe, and every session reads its own when it wakes.
-        const TEXTS: [&str; 8] =
-            [DEFAULT_1, DEFAULT_2, DEFAULT_3, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
-        static SHIPPED: [OnceLock<Recipe>; TEXTS.len()] = [const { OnceLock::new() }; TEXTS.len()];
-        // Release 0.1 wrote `default-1` with the name `default`.
-        static FORMER: LazyLock<String> =
-            LazyLock::new(|| DEFAULT_1.replacen("\"default-1\"", "\"default\"", 1));
-        static FORMER_READ: OnceLock<Recipe> = OnceLock::new();
-        if toml == *FORMER {
-            if let Some(recipe) = FORMER_READ.get() {
-                return Ok(recipe.clone());
-            }
-            let recipe = Recipe::read(toml)?;
-            return Ok(FORMER_READ.get_or_init(|| recipe).clone());
-        }
-        let Some(index) = TEXTS.iter().position(|text| *text == toml) else {
+        static SHIPPED: LazyLock<Vec<(String, OnceLock<Recipe>)>> = LazyLock::new(|| {
+            // Release 0.1 wrote `default-1` with the name `default`.
+            let former = DEFAULT_1.replacen("\"default-1\"", "\"default\"", 1);
+            let texts =
+                [DEFAULT_1, DEFAULT_2, &DEFAULT_3, PAPER, TINY, GRAMMAR, SEQ2SEQ, SEQ2SEQ_GRAMMAR];
+            let texts = texts.into_iter().map(str::to_owned).chain([former]);
+            texts.map(|text| (text, OnceLock::new())).collect()
+        });
+        let Some((_, kept)) = SHIPPED.iter().find(|(text, _)| text == toml) else {
             return Recipe::read(toml);
         };
-        if let Some(recipe) = SHIPPED[index].get() {
+        if let Some(recipe) = kept.get() {
             return Ok(recipe.clone());
         }
         let recipe = Recipe::read(toml)?;
-        Ok(SHIPPED[index].get_or_init(|| recipe).clone())
+        Ok(kept.get_or_init(|| recipe).clone())
     }
 
     fn read(toml: &str) -> Result<Recipe, RecipeError> {

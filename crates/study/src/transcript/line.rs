@@ -80,7 +80,7 @@ pub enum Act {
 pub enum Answer {
     Understood(Program),
     NotSure,
-    /// It asked; the choices that it offered.
+    /// It asked; the options that it offered.
     Asked(Vec<String>),
     /// It answered a question, or said something. What it said is not compared.
     Told,

@@ -317,7 +317,7 @@ pub fn show(outcome: &Outcome, evidence: &Evidence, before: u32) -> (Answer, Str
         }
         Outcome::Asked { question } => {
             let labels: Vec<String> =
-                question.choices.iter().map(|choice| choice.label.clone()).collect();
+                question.options.iter().map(|option| option.label.clone()).collect();
             let text = format!("~ asked {} ({})", labels.join(", "), question.text);
             (Answer::Asked(labels), text)
         }

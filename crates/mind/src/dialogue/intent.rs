@@ -1,14 +1,14 @@
 use super::Dialogue;
 use super::questions;
 use super::replies;
-use crate::language::{Mention, Question, Utterance, is_mark};
-use crate::world::Lexicon;
+use crate::language::{AnswerOption, Mention, Question, Utterance, WordLists, is_mark};
+use crate::world::{Lexicon, Words};
 
-/// What an utterance is in a conversation.
+/// What a person wants with an utterance.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Heard {
-    /// It chooses from the open question, by 0-based place.
-    Chose(usize),
+pub enum Intent {
+    /// It chooses this from the open question.
+    Chose(AnswerOption),
     /// It refuses everything that the open question offers.
     Refused,
     /// It says that the last act was wrong.
@@ -62,8 +62,16 @@ pub enum Named {
 impl Dialogue {
     /// Reads an utterance against what is open.
     ///
+    /// - `lexicon`, `lists`: of the recipe. Without lists no question is read.
     /// - `open`: the question that was asked right before it.
-    pub fn hear(&self, said: &Utterance, open: Option<&Question>, lexicon: &Lexicon) -> Heard {
+    pub fn read<D: Words>(
+        &self,
+        domain: &D,
+        lexicon: &Lexicon,
+        lists: Option<&WordLists>,
+        said: &Utterance,
+        open: Option<&Question>,
+    ) -> Intent {
         let tokens = said.tokens();
         let words: Vec<&str> =
             tokens.iter().map(String::as_str).filter(|token| !is_mark(token)).collect();
@@ -72,21 +80,22 @@ impl Dialogue {
         let refuses = self.no.contains(&text);
         if let Some(question) = open {
             if refuses {
-                return Heard::Refused;
+                return Intent::Refused;
             }
             if let Some(place) = replies::chosen(question, &words, accepts) {
-                return Heard::Chose(place);
+                return Intent::Chose(question.options[place].clone());
             }
         }
         if self.wrong.contains(&text) {
-            return Heard::Wrong;
+            return Intent::Wrong;
         }
         if accepts {
-            return Heard::NothingAsked;
+            return Intent::NothingAsked;
         }
-        match self.questions.then(|| questions::about(&words, lexicon)).flatten() {
-            Some(about) => Heard::Question(about),
-            None => Heard::Request,
+        let lists = lists.filter(|_| self.questions);
+        match lists.and_then(|lists| questions::about(domain, lexicon, lists, &words)) {
+            Some(about) => Intent::Question(about),
+            None => Intent::Request,
         }
     }
 }
