@@ -5,11 +5,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
+use apprentice::client::Command;
 use apprentice::ids::Seq;
 use apprentice::learning::Recipe;
 use apprentice::parallel::Progress;
 use apprentice::replay::{Minds, Scrutiny, audit, keep_snapshot, rebuild, rebuild_at, streams_of};
-use apprentice::session::Command;
 use apprentice::store::open_memory;
 use apprentice_testkit::diary::Diary;
 use apprentice_testkit::toy::Bells;

@@ -294,7 +294,7 @@ impl<'a, D: Domain> Auditor<'a, D> {
         }
         self.counts.reproposed += 1;
         self.counts.reproposed_utterances += u64::from(says);
-        match repropose::compare(&self.session, &command, batch) {
+        match repropose::compare(&self.session, &command.into(), batch) {
             Verdict::Same => {}
             Verdict::OfOld => self.counts.proposals_differ += 1,
             Verdict::Differs(difference) => {

@@ -5,7 +5,7 @@ use super::apply::apply_event;
 use super::dialogue::{self, Decided};
 use super::state::{Episode, State, Unexplained};
 use super::{Command, Divergence, Rejection, Session};
-use crate::client::{OnClash, Phase};
+use crate::client::{self, OnClash, Phase};
 use crate::events::{
     DecompositionDeclined, DecompositionTaught, Ending, EpisodeEnded, EpisodeStarted, Event,
     Interpreted, LessonForgotten, MarkedWrong, Report, RetrainCompleted, RetrainFailed,
@@ -77,37 +77,51 @@ pub(super) fn decide<D: Domain>(
         (_, Command::Open { user, recipe_text, mind }) => {
             draft.add(open(session, user, recipe_text, *mind)?)?;
         }
-        (Phase::Idle, Command::StartEpisode { stage }) => draft.add(start(session, stage)?)?,
-        (Phase::Interacting, Command::Say { utterance }) => say(&mut draft, utterance)?,
-        (Phase::Interacting | Phase::Teaching | Phase::Idle, Command::MarkWrong) => {
-            mark_wrong(&mut draft, None)?;
-        }
-        (Phase::Interacting, Command::Done) => draft.add(end(&draft.state, Ending::Abandoned))?,
-        (Phase::Teaching, Command::Teach { explains, actions, on_clash }) => {
-            teach(&mut draft, *explains, actions, *on_clash)?;
-        }
-        (Phase::Teaching, Command::FinishTeaching) => draft.add(retrain(&draft))?,
-        (Phase::Teaching, Command::Forget { lesson }) => draft.add(forget(session, *lesson)?)?,
-        (Phase::Idle, Command::Forget { lesson }) => {
-            draft.add(forget(session, *lesson)?)?;
-            draft.add(retrain(&draft))?;
-        }
-        // A mistyped name must not become a person.
-        (_, Command::Close { .. }) if session.state.opened.is_none() => {
-            return Err(Rejection::NobodyThere.into());
-        }
-        (_, Command::Close { reason }) => {
-            draft.add(Event::SessionClosed(SessionClosed { reason: reason.clone() }))?;
-        }
+        (phase, Command::Person(wanted)) => persons(&mut draft, phase, wanted, command.name())?,
         (_, Command::FinishRetrain { recipe, outcome }) => {
             draft.add(finish_retrain(session, *recipe, outcome)?)?;
         }
-        (Phase::Learning, _) => return Err(Rejection::StillLearning.into()),
-        (phase, command) => {
-            return Err(Rejection::WrongPhase { command: command.name(), phase }.into());
-        }
     }
     Ok(draft.events)
+}
+
+/// What a person wants, in an open session.
+///
+/// - `name`: of the command.
+fn persons<D: Domain>(
+    draft: &mut Draft<D>,
+    phase: Phase,
+    command: &client::Command,
+    name: &'static str,
+) -> Result<(), Refusal> {
+    use client::Command;
+    let session = draft.session;
+    match (phase, command) {
+        (Phase::Idle, Command::StartEpisode { stage }) => draft.add(start(session, stage)?),
+        (Phase::Interacting, Command::Say { utterance }) => say(draft, utterance),
+        (Phase::Interacting | Phase::Teaching | Phase::Idle, Command::MarkWrong) => {
+            mark_wrong(draft, None)
+        }
+        (Phase::Interacting, Command::Done) => draft.add(end(&draft.state, Ending::Abandoned)),
+        (Phase::Teaching, Command::Teach { explains, actions, on_clash }) => {
+            teach(draft, *explains, actions, *on_clash)
+        }
+        (Phase::Teaching, Command::FinishTeaching) => draft.add(retrain(draft)),
+        (Phase::Teaching, Command::Forget { lesson }) => draft.add(forget(session, *lesson)?),
+        (Phase::Idle, Command::Forget { lesson }) => {
+            draft.add(forget(session, *lesson)?)?;
+            draft.add(retrain(draft))
+        }
+        // A mistyped name must not become a person.
+        (_, Command::Close { .. }) if session.state.opened.is_none() => {
+            Err(Rejection::NobodyThere.into())
+        }
+        (_, Command::Close { reason }) => {
+            draft.add(Event::SessionClosed(SessionClosed { reason: reason.clone() }))
+        }
+        (Phase::Learning, _) => Err(Rejection::StillLearning.into()),
+        (phase, _) => Err(Rejection::WrongPhase { command: name, phase }.into()),
+    }
 }
 
 fn open<D: World>(

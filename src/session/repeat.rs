@@ -4,8 +4,8 @@
 //! it led to: that needs nothing but the log, and holds for records of every version.
 
 use super::decide;
-use super::{Command, Rejection, Session, reply_of};
-use crate::client::{OnClash, Reply};
+use super::{Rejection, Session, reply_of};
+use crate::client::{Command, OnClash, Reply};
 use crate::events::{Ending, EpisodeStarted, Event, Record};
 use crate::language::{Document, Utterance};
 use crate::world::{Stage, World};
@@ -65,7 +65,7 @@ impl<D: World> Session<D> {
     ///
     /// - errors: [`Rejection::RequestIdReused`] when another command led to these records.
     /// - panics: when `records` is empty.
-    pub fn repeat(&self, command: &Command, records: &[Record]) -> Result<Reply, Rejection> {
+    pub fn repeat(&self, command: &super::Command, records: &[Record]) -> Result<Reply, Rejection> {
         if self.led_to(command, records) {
             return Ok(reply_of(records));
         }
@@ -74,24 +74,27 @@ impl<D: World> Session<D> {
         Err(Rejection::RequestIdReused { request: first.request, used_for, first: first.seq })
     }
 
-    fn led_to(&self, command: &Command, records: &[Record]) -> bool {
-        match (command, &records[0].event) {
-            (Command::Open { user, recipe_text, mind }, Event::SessionOpened(event)) => {
-                (user, recipe_text, mind) == (&event.user, &event.recipe_text, &event.mind)
+    fn led_to(&self, command: &super::Command, records: &[Record]) -> bool {
+        let command = match (command, &records[0].event) {
+            (super::Command::Person(command), _) => command,
+            (super::Command::Open { user, recipe_text, mind }, Event::SessionOpened(event)) => {
+                return (user, recipe_text, mind) == (&event.user, &event.recipe_text, &event.mind);
             }
+            (super::Command::FinishRetrain { recipe, outcome }, Event::RetrainCompleted(event)) => {
+                let found = outcome.as_ref();
+                let same = found.is_ok_and(|it| (&it.0, &it.1) == (&event.mind, &event.report));
+                return same && *recipe == event.recipe;
+            }
+            (super::Command::FinishRetrain { recipe, outcome }, Event::RetrainFailed(event)) => {
+                return *recipe == event.recipe && outcome.as_ref() == Err(&event.reason);
+            }
+            _ => return false,
+        };
+        match (command, &records[0].event) {
             (Command::StartEpisode { stage }, Event::EpisodeStarted(event)) => {
                 self.is_staged(stage, event)
             }
             (Command::Close { reason }, Event::SessionClosed(event)) => *reason == event.reason,
-            (Command::FinishRetrain { recipe, outcome }, Event::RetrainCompleted(event)) => {
-                let found = outcome
-                    .as_ref()
-                    .is_ok_and(|found| (&found.0, &found.1) == (&event.mind, &event.report));
-                found && *recipe == event.recipe
-            }
-            (Command::FinishRetrain { recipe, outcome }, Event::RetrainFailed(event)) => {
-                *recipe == event.recipe && outcome.as_ref() == Err(&event.reason)
-            }
             _ => command_of(records).is_some_and(|recorded| is_recorded_as(command, &recorded)),
         }
     }
@@ -132,7 +135,7 @@ fn is_recorded_as(command: &Command, recorded: &Command) -> bool {
 /// The name of the command that these records came from.
 fn used_for(records: &[Record]) -> &'static str {
     match (command_of(records), &records[0].event) {
-        (Some(command), _) => command.name(),
+        (Some(command), _) => super::Command::from(command).name(),
         (None, Event::SessionOpened(_)) => "open",
         (None, Event::EpisodeStarted(_)) => "start an episode",
         (None, Event::SessionClosed(_)) => "close",

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use apprentice::client::{ClientError, OnClash, Phase, RejectionCode, Told};
+use apprentice::client::{ClientError, Command, OnClash, Phase, RejectionCode, Told};
 use apprentice::events::Event;
 use apprentice::ids::{Digest, Seq, UserId};
 use apprentice::language::Outcome;
 use apprentice::learning::Recipe;
 use apprentice::service::{Data, Service};
-use apprentice::session::{Command, Rejection};
+use apprentice::session::Rejection;
 use apprentice::store::open_memory;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
@@ -141,7 +141,10 @@ fn a_failed_training_after_forgetting_leaves_a_mind_that_can_be_rebuilt() {
     let mind = diary.session.state().mind;
     diary.accept(&Command::Forget { lesson: lessons[0] });
     let recipe = diary.session.recipe().digest();
-    diary.accept(&Command::FinishRetrain { recipe, outcome: Err("no room".to_owned()) });
+    diary.perform(&apprentice::session::Command::FinishRetrain {
+        recipe,
+        outcome: Err("no room".to_owned()),
+    });
     assert_eq!(diary.session.state().mind, mind, "the former mind stays");
     // Its lessons are still there for a later training.
     let minds = apprentice::replay::Minds::default();

@@ -3,13 +3,13 @@
 
 use std::sync::Arc;
 
-use apprentice::client::{OnClash, Phase, RejectionCode, Reply, Told};
+use apprentice::client::{Command, OnClash, Phase, RejectionCode, Reply, Told};
 use apprentice::events::{Event, Record};
 use apprentice::ids::{RequestId, Seq, TenantId, Timestamp, UserId};
 use apprentice::invariants::Invariant;
 use apprentice::learning::{Recipe, train};
 use apprentice::replay::{Minds, read_back, rebuild, rebuild_at};
-use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session};
+use apprentice::session::{self, Outstanding, Proposed, Rejection, Session};
 use apprentice::store::{Store, open_memory};
 use apprentice::world::Stage;
 use apprentice_testkit::toy::Bells;
@@ -33,8 +33,8 @@ impl Person {
         let mind = Arc::new(train(&*domain, &recipe, &[]).unwrap());
         let session = Session::new(domain);
         let mut person = Person { session, store, stream, requests: 0 };
-        let open = Command::Open { user, recipe_text, mind: mind.digest() };
-        person.accept(&open);
+        let open = session::Command::Open { user, recipe_text, mind: mind.digest() };
+        person.accept(open);
         person.session.install(mind);
         person
     }
@@ -43,7 +43,7 @@ impl Person {
     fn at(phase: Phase) -> Person {
         let mut person = Person::new();
         if phase == Phase::Closed {
-            person.accept(&Command::Close { reason: "withdrew".to_owned() });
+            person.accept(Command::Close { reason: "withdrew".to_owned() });
         }
         if !matches!(phase, Phase::Idle | Phase::Closed) {
             person.start("Brass Glass");
@@ -51,11 +51,11 @@ impl Person {
         if matches!(phase, Phase::Teaching | Phase::Learning) {
             person.say("polish the brass bell");
             person.say("ring the brass bell");
-            person.accept(&Command::Done);
+            person.accept(Command::Done);
         }
         if phase == Phase::Learning {
             person.teach_last(&[1], OnClash::Ask).unwrap();
-            person.accept(&Command::FinishTeaching);
+            person.accept(Command::FinishTeaching);
         }
         assert_eq!(person.session.phase(), phase);
         person
@@ -66,10 +66,11 @@ impl Person {
         RequestId([self.requests; 16])
     }
 
-    fn give(&mut self, command: &Command) -> Result<Reply, Rejection> {
+    fn give(&mut self, command: impl Into<session::Command>) -> Result<Reply, Rejection> {
+        let command = command.into();
         let request = self.request();
         let at = self.session.next_at(Timestamp(1_000));
-        let turn = match self.session.propose(command, request, at)? {
+        let turn = match self.session.propose(&command, request, at)? {
             Proposed::Turn(turn) => turn,
             Proposed::Repeat { .. } => panic!("a fresh request id was answered before"),
             Proposed::Defect(divergence) => panic!("{command:?}: {divergence}"),
@@ -78,23 +79,25 @@ impl Person {
         Ok(self.session.settle(&durable).unwrap())
     }
 
-    fn accept(&mut self, command: &Command) -> Reply {
-        self.give(command).unwrap_or_else(|refused| panic!("{command:?} was refused: {refused}"))
+    fn accept(&mut self, command: impl Into<session::Command>) -> Reply {
+        let command = command.into();
+        self.give(command.clone())
+            .unwrap_or_else(|refused| panic!("{command:?} was refused: {refused}"))
     }
 
     fn start(&mut self, task: &str) {
         let stage = Stage::Task { task: task.to_owned(), seed: 1 };
-        self.accept(&Command::StartEpisode { stage });
+        self.accept(Command::StartEpisode { stage });
     }
 
     fn say(&mut self, utterance: &str) -> Reply {
-        self.accept(&Command::Say { utterance: utterance.to_owned() })
+        self.accept(Command::Say { utterance: utterance.to_owned() })
     }
 
     /// Teaches the first utterance that can still be taught.
     fn teach_last(&mut self, actions: &[u32], on_clash: OnClash) -> Result<Reply, Rejection> {
         let explains = self.session.status().to_teach[0].seq;
-        self.give(&Command::Teach { explains, actions: actions.to_vec(), on_clash })
+        self.give(Command::Teach { explains, actions: actions.to_vec(), on_clash })
     }
 
     /// Does the outstanding work of the state, as the actor and its trainer do.
@@ -104,7 +107,7 @@ impl Person {
         };
         let mind = Arc::new(train(&**self.session.domain(), &recipe, &lessons).unwrap());
         let outcome = Ok((mind.digest(), Default::default()));
-        self.accept(&Command::FinishRetrain { recipe: recipe.digest(), outcome });
+        self.accept(session::Command::FinishRetrain { recipe: recipe.digest(), outcome });
         self.session.install(mind);
     }
 
@@ -115,23 +118,24 @@ impl Person {
 }
 
 /// One command of each kind.
-fn every_command() -> Vec<Command> {
+fn every_command() -> Vec<session::Command> {
     let recipe = Recipe::parse(Recipe::builtin("tiny").unwrap()).unwrap().digest();
     vec![
-        Command::Open {
+        session::Command::Open {
             user: UserId::new("eve").unwrap(),
             recipe_text: Recipe::builtin("tiny").unwrap().to_owned(),
             mind: recipe,
         },
-        Command::StartEpisode { stage: Stage::Seed { seed: 3 } },
-        Command::Say { utterance: "ring the silver bell".to_owned() },
-        Command::Done,
+        Command::StartEpisode { stage: Stage::Seed { seed: 3 } }.into(),
+        Command::Say { utterance: "ring the silver bell".to_owned() }.into(),
+        Command::Done.into(),
         // In Teaching this is the record of "polish the brass bell".
-        Command::Teach { explains: Seq::new(3).unwrap(), actions: vec![1], on_clash: OnClash::Ask },
-        Command::FinishTeaching,
-        Command::Forget { lesson: Seq::new(6).unwrap() },
-        Command::Close { reason: "enough".to_owned() },
-        Command::FinishRetrain { recipe, outcome: Err("no room".to_owned()) },
+        Command::Teach { explains: Seq::new(3).unwrap(), actions: vec![1], on_clash: OnClash::Ask }
+            .into(),
+        Command::FinishTeaching.into(),
+        Command::Forget { lesson: Seq::new(6).unwrap() }.into(),
+        Command::Close { reason: "enough".to_owned() }.into(),
+        session::Command::FinishRetrain { recipe, outcome: Err("no room".to_owned()) },
     ]
 }
 
@@ -202,7 +206,7 @@ fn every_phase_meets_every_command_with_events_or_the_right_refusal() {
         for (command, expected) in every_command().iter().zip(expected) {
             let mut person = Person::at(phase);
             let before = (person.session.state_digest(), person.records().len());
-            let refused = person.give(command).err();
+            let refused = person.give(command.clone()).err();
             let code = refused.as_ref().map(Rejection::code);
             assert_eq!(code, expected, "{phase:?} × {}: {refused:?}", command.name());
             let after = (person.session.state_digest(), person.records().len());
@@ -226,7 +230,7 @@ fn a_lesson_is_taught_learned_used_forgotten_and_gone() {
         }
         told => panic!("{told:?}"),
     };
-    person.accept(&Command::FinishTeaching);
+    person.accept(Command::FinishTeaching);
     person.learn();
     assert_ne!(person.session.state().mind, base);
 
@@ -237,7 +241,7 @@ fn a_lesson_is_taught_learned_used_forgotten_and_gone() {
     assert!(reply.told.iter().any(ended), "the taught words reach the goal: {reply:?}");
     assert_eq!(person.session.phase(), Phase::Idle, "nothing was left to teach");
 
-    person.accept(&Command::Forget { lesson });
+    person.accept(Command::Forget { lesson });
     assert_eq!(person.session.phase(), Phase::Learning);
     person.learn();
     assert_eq!(
@@ -255,7 +259,7 @@ fn a_teach_that_cannot_be_is_refused_by_what_is_wrong_with_it() {
     person.say("polish the silver bell");
     person.say("ring the silver bell");
     person.say("mute the silver bell");
-    person.accept(&Command::Done);
+    person.accept(Command::Done);
     let refusal = |person: &mut Person, actions: &[u32]| {
         person.teach_last(actions, OnClash::Ask).unwrap_err()
     };
@@ -267,19 +271,19 @@ fn a_teach_that_cannot_be_is_refused_by_what_is_wrong_with_it() {
     assert!(matches!(refusal(&mut person, &[1, 2]), Rejection::NotAfter { before: 1, .. }));
     let explains = Seq::new(99).unwrap();
     let nothing = Command::Teach { explains, actions: vec![], on_clash: OnClash::Ask };
-    assert!(matches!(person.give(&nothing), Err(Rejection::NothingToTeach { .. })));
+    assert!(matches!(person.give(nothing), Err(Rejection::NothingToTeach { .. })));
 
     let explains = person.session.status().to_teach[0].seq;
     person.teach_last(&[2, 3], OnClash::Ask).unwrap();
     let again = Command::Teach { explains, actions: vec![2], on_clash: OnClash::Ask };
-    assert!(matches!(person.give(&again), Err(Rejection::TaughtAlready { .. })));
+    assert!(matches!(person.give(again), Err(Rejection::TaughtAlready { .. })));
 }
 
 #[test]
 fn a_clash_is_put_to_the_person_and_replacing_forgets_the_old_lesson() {
     let mut person = Person::at(Phase::Teaching);
     person.teach_last(&[1], OnClash::Ask).unwrap();
-    person.accept(&Command::FinishTeaching);
+    person.accept(Command::FinishTeaching);
     // Nothing else can be taught while learning. So the second meaning comes from a world in which
     // the first one cannot run, because the bell rings already.
     person.learn();
@@ -287,7 +291,7 @@ fn a_clash_is_put_to_the_person_and_replacing_forgets_the_old_lesson() {
     person.say("ring the brass bell");
     person.say("polish the brass bell");
     person.say("mute the brass bell");
-    person.accept(&Command::Done);
+    person.accept(Command::Done);
     let clash = person.teach_last(&[2], OnClash::Ask).unwrap_err();
     assert!(matches!(clash, Rejection::Clash { lesson: Some(_), .. }), "{clash}");
     let reply = person.teach_last(&[2], OnClash::Replace).unwrap();
@@ -299,9 +303,9 @@ fn a_clash_is_put_to_the_person_and_replacing_forgets_the_old_lesson() {
 fn a_repeated_request_is_answered_from_the_log() {
     let mut person = Person::at(Phase::Interacting);
     let command = Command::Say { utterance: "ring the silver bell".to_owned() };
-    let reply = person.accept(&command);
+    let reply = person.accept(command.clone());
     let request = RequestId([person.requests; 16]);
-    let again = person.session.propose(&command, request, Timestamp(2_000)).unwrap();
+    let again = person.session.propose(&command.into(), request, Timestamp(2_000)).unwrap();
     assert_eq!(again, Proposed::Repeat { first: reply.first, last: reply.last });
     let records = (reply.first, reply.last);
     read_back(&*person.store.log, &person.stream, request, records).unwrap();

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use apprentice::client::Command;
 use apprentice::events::{Batch, Event, Head, Record};
 use apprentice::ids::{Digest, Seq, StreamId, TenantId};
 use apprentice::language::Outcome;
 use apprentice::learning::{Recipe, train};
 use apprentice::replay::{AuditReport, Difference, Scrutiny, audit, keep_mind, streams_of};
-use apprentice::session::Command;
 use apprentice::store::{
     AppendError, Draft, EventLog, Pending, ReadError, SealedRecords, SeededEntropy, Store, Walk,
     open, open_memory,

@@ -5,7 +5,7 @@
 use std::fs;
 use std::sync::Arc;
 
-use apprentice::client::OnClash;
+use apprentice::client::{Command, OnClash};
 use apprentice::events::{Event, Head};
 use apprentice::ids::{Digest, RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use apprentice::invariants::Invariant;
@@ -13,7 +13,7 @@ use apprentice::learning::{Recipe, code_digest, train};
 use apprentice::replay::{
     Minds, RebuildError, Work, keep_mind, keep_snapshot, mind_origin, rebuild, state_origin,
 };
-use apprentice::session::{Command, Outstanding, Proposed, Session};
+use apprentice::session::{self, Outstanding, Proposed, Session};
 use apprentice::store::{CacheCounts, Origin, Store, open};
 use apprentice::world::Stage;
 use apprentice_testkit::toy::Bells;
@@ -38,31 +38,37 @@ impl Ada {
         let recipe = Recipe::parse(&recipe_text).unwrap();
         let base = Arc::new(train(&*domain, &recipe, &[]).unwrap());
         let mut session = Session::new(domain);
-        let open = Command::Open { user, recipe_text, mind: base.digest() };
-        ada.act(&store, &mut session, &open);
+        let open = session::Command::Open { user, recipe_text, mind: base.digest() };
+        ada.act(&store, &mut session, open);
         session.install(base);
         ada.talk(&store, &mut session);
         let polish = session.status().to_teach[0].seq;
         let teach = Command::Teach { explains: polish, actions: vec![1], on_clash: OnClash::Ask };
-        ada.act(&store, &mut session, &teach);
-        ada.act(&store, &mut session, &Command::FinishTeaching);
+        ada.act(&store, &mut session, teach);
+        ada.act(&store, &mut session, Command::FinishTeaching);
         let Some(Outstanding::Retrain { recipe, lessons }) = session.outstanding() else {
             panic!("a training is due")
         };
         let mind = Arc::new(train(&*ada.domain, &recipe, &lessons).unwrap());
         let outcome = Ok((mind.digest(), mind.report().clone()));
-        let finish = Command::FinishRetrain { recipe: recipe.digest(), outcome };
-        ada.act(&store, &mut session, &finish);
+        let finish = session::Command::FinishRetrain { recipe: recipe.digest(), outcome };
+        ada.act(&store, &mut session, finish);
         session.install(mind.clone());
         keep_mind(&store, &ada.stream, &mind).unwrap();
         keep_snapshot(&store, &ada.stream, &session).unwrap();
         ada
     }
 
-    fn act(&mut self, store: &Store, session: &mut Session<Bells>, command: &Command) {
+    fn act(
+        &mut self,
+        store: &Store,
+        session: &mut Session<Bells>,
+        command: impl Into<session::Command>,
+    ) {
+        let command = command.into();
         self.requests += 1;
         let at = session.next_at(Timestamp(1_000_000));
-        let proposed = session.propose(command, RequestId([self.requests; 16]), at).unwrap();
+        let proposed = session.propose(&command, RequestId([self.requests; 16]), at).unwrap();
         let Proposed::Turn(turn) = proposed else { panic!("{command:?} was answered before") };
         let durable = store.log.append(&self.stream, turn.after, turn.batch).wait().unwrap();
         session.settle(&durable).unwrap();
@@ -71,11 +77,11 @@ impl Ada {
     /// An episode with one utterance that is not understood and one that is.
     fn talk(&mut self, store: &Store, session: &mut Session<Bells>) {
         let stage = Stage::Task { task: "Brass Glass".to_owned(), seed: 1 };
-        self.act(store, session, &Command::StartEpisode { stage });
+        self.act(store, session, Command::StartEpisode { stage });
         for utterance in ["polish the brass bell", "ring the brass bell"] {
-            self.act(store, session, &Command::Say { utterance: utterance.to_owned() });
+            self.act(store, session, Command::Say { utterance: utterance.to_owned() });
         }
-        self.act(store, session, &Command::Done);
+        self.act(store, session, Command::Done);
     }
 
     fn open(&self) -> Store {
@@ -212,10 +218,10 @@ fn a_mind_that_this_code_trains_differently_is_used_as_it_was_kept() {
     // gave the mind of one lesson.
     let mind = session.mind().unwrap().clone();
     let lesson: Seq = session.state().lessons[0].seq;
-    ada.act(&store, &mut session, &Command::Forget { lesson });
+    ada.act(&store, &mut session, Command::Forget { lesson });
     let outcome = Ok((mind.digest(), mind.report().clone()));
-    let finish = Command::FinishRetrain { recipe: mind.recipe(), outcome };
-    ada.act(&store, &mut session, &finish);
+    let finish = session::Command::FinishRetrain { recipe: mind.recipe(), outcome };
+    ada.act(&store, &mut session, finish);
     let then = Origin { code: Digest::of(b"other code"), ..mind_origin(mind.recipe()) };
     store.models.put(&ada.stream, &then, mind.digest(), &mind.to_bytes()).unwrap();
     let (session, work) = ada.wake(&store);

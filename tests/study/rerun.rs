@@ -5,12 +5,13 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use apprentice::client::Command;
 use apprentice::events::Event;
 use apprentice::grounding::Moment;
 use apprentice::language::Outcome;
 use apprentice::learning::{Mind, Recipe, train};
 use apprentice::replay::{keep_mind, streams_of};
-use apprentice::session::{self, Outstanding, Session};
+use apprentice::session::{Outstanding, Session};
 use apprentice::store::{Store, copy_private, open, open_memory};
 use apprentice::world::Domain;
 use apprentice::world::household::Household;
@@ -46,7 +47,7 @@ fn life(domain: &Arc<Bells>, store: &Store, user: &str) -> Diary<Bells> {
     let teachable = |diary: &Diary<Bells>| diary.session.status().to_teach.first().map(|t| t.seq);
     while let Some(explains) = teachable(&diary) {
         let (actions, on_clash) = (Vec::new(), Default::default());
-        diary.accept(&session::Command::Teach { explains, actions, on_clash });
+        diary.accept(&Command::Teach { explains, actions, on_clash });
     }
     diary.learn();
     diary.start("Brass Silver Glass");
@@ -56,7 +57,7 @@ fn life(domain: &Arc<Bells>, store: &Store, user: &str) -> Diary<Bells> {
     diary.done();
     diary.learn();
     let lesson = diary.session.state().lessons[0].seq;
-    diary.accept(&session::Command::Forget { lesson });
+    diary.accept(&Command::Forget { lesson });
     diary.learn();
     diary.start("Silver");
     diary.say("polish the silver bell");

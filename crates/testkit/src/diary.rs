@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use apprentice::client::{OnClash, Phase, Reply, Told};
+use apprentice::client::{Command, OnClash, Phase, Reply, Told};
 use apprentice::events::{Batch, Event, Head, Record};
 use apprentice::ids::{RequestId, Seq, StreamId, TenantId, Timestamp, UserId};
 use apprentice::learning::{Mind, Recipe, train};
-use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session};
+use apprentice::session::{self, Outstanding, Proposed, Rejection, Session};
 use apprentice::store::Store;
 use apprentice::world::{Domain, Stage};
 
@@ -42,7 +42,7 @@ impl<D: Domain> Diary<D> {
         let mut diary =
             Diary { session, store: store.clone(), stream, minds: vec![mind.clone()], requests: 0 };
         let recipe_text = recipe_text.to_owned();
-        diary.accept(&Command::Open { user, recipe_text, mind: mind.digest() });
+        diary.perform(&session::Command::Open { user, recipe_text, mind: mind.digest() });
         diary.session.install(mind);
         diary
     }
@@ -51,18 +51,31 @@ impl<D: Domain> Diary<D> {
     ///
     /// - errors: the command is declined; nothing was recorded.
     pub fn give(&mut self, command: &Command) -> Result<Reply, Rejection> {
-        self.decided_by(Session::propose, command)
+        self.decided_by(Session::propose, &command.clone().into())
+    }
+
+    /// Gives a command of any kind, such as one from inside the service.
+    ///
+    /// - panics: if the command is declined.
+    pub fn perform(&mut self, command: &session::Command) -> Reply {
+        let decided = self.decided_by(Session::propose, command);
+        decided.unwrap_or_else(|refused| panic!("{command:?} was refused: {refused}"))
     }
 
     /// As [`Diary::give`], by the rules of older versions, which accepted more characters.
     pub fn give_as_of_old(&mut self, command: &Command) -> Result<Reply, Rejection> {
-        self.decided_by(Session::propose_recorded, command)
+        self.decided_by(Session::propose_recorded, &command.clone().into())
     }
 
     fn decided_by(
         &mut self,
-        propose: fn(&Session<D>, &Command, RequestId, Timestamp) -> Result<Proposed, Rejection>,
-        command: &Command,
+        propose: fn(
+            &Session<D>,
+            &session::Command,
+            RequestId,
+            Timestamp,
+        ) -> Result<Proposed, Rejection>,
+        command: &session::Command,
     ) -> Result<Reply, Rejection> {
         self.requests += 1;
         let mut request = [0; 16];
@@ -124,7 +137,7 @@ impl<D: Domain> Diary<D> {
         };
         let mind = Arc::new(train(&**self.session.domain(), &recipe, &lessons).unwrap());
         let outcome = Ok((mind.digest(), mind.report().clone()));
-        self.accept(&Command::FinishRetrain { recipe: recipe.digest(), outcome });
+        self.perform(&session::Command::FinishRetrain { recipe: recipe.digest(), outcome });
         self.session.install(mind.clone());
         self.minds.push(mind.clone());
         mind

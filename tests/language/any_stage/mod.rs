@@ -14,9 +14,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
-use apprentice::client::RejectionCode;
+use apprentice::client::{Command, RejectionCode};
 use apprentice::learning::{Recipe, train};
-use apprentice::session::Command;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;
 use apprentice_testkit::chance;
@@ -78,7 +77,7 @@ fn a_stage_whose_goal_holds_is_refused_in_one_sentence() {
     ] {
         let stage = Stage::Scene { scene: scene.to_owned(), task: task.to_owned() };
         let mut person = Person::new(&house, 1, &mut Counts::default());
-        let started = person.give(&Command::StartEpisode { stage }, &mut Counts::default());
+        let started = person.give(&Command::StartEpisode { stage }.into(), &mut Counts::default());
         match (started, refused) {
             (Ok(_), None) => {}
             (Err(rejection), Some(sentence)) => {

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use apprentice::client::{OnClash, Phase, RejectionCode, Reply};
+use apprentice::client::{Command, OnClash, Phase, RejectionCode, Reply};
 use apprentice::events::{Ending, Event, Record};
 use apprentice::ids::{Digest, RequestId, Seq, Timestamp, UserId};
 use apprentice::language::{Outcome, Step};
 use apprentice::learning::{Mind, train};
-use apprentice::session::{Command, Outstanding, Proposed, Rejection, Session, reply_of};
+use apprentice::session::{self, Outstanding, Proposed, Rejection, Session, reply_of};
 use apprentice::store::SeededEntropy;
 use apprentice::world::household::{Household, Kind};
 use apprentice::world::{StageError, World};
@@ -74,7 +74,7 @@ pub struct Person<'a> {
     session: Session<Household>,
     records: Vec<Record>,
     /// What was accepted, with its request id.
-    asked: Vec<(RequestId, Command)>,
+    asked: Vec<(RequestId, session::Command)>,
     requests: u128,
     kinds: Vec<Kind>,
     /// The mind that the last training gave.
@@ -108,7 +108,7 @@ impl<'a> Person<'a> {
         };
         let user = UserId::new("ada").unwrap();
         let (recipe_text, mind) = (house.recipe_text.clone(), house.base.digest());
-        person.give(&Command::Open { user, recipe_text, mind }, counts).unwrap();
+        person.give(&session::Command::Open { user, recipe_text, mind }, counts).unwrap();
         person.session.install(house.base.clone());
         person
     }
@@ -118,7 +118,11 @@ impl<'a> Person<'a> {
     }
 
     /// Proposes and applies, as an actor and a log do.
-    pub fn give(&mut self, command: &Command, counts: &mut Counts) -> Result<Reply, Rejection> {
+    pub fn give(
+        &mut self,
+        command: &session::Command,
+        counts: &mut Counts,
+    ) -> Result<Reply, Rejection> {
         self.requests += 1;
         let request = RequestId(self.requests.to_be_bytes());
         let at = self.session.next_at(Timestamp(1_000));
@@ -178,14 +182,14 @@ impl<'a> Person<'a> {
         }
     }
 
-    fn after(&mut self, command: &Command) {
+    fn after(&mut self, command: &session::Command) {
         let _ = self.session.status();
         if self.session.mind_wanted().is_some()
             && let Some(mind) = self.trained.take()
         {
             self.session.install(mind);
         }
-        if let Command::StartEpisode { .. } = command {
+        if let session::Command::Person(Command::StartEpisode { .. }) = command {
             let episode = self.session.state().episode.as_ref().expect("it just started");
             let done = self.house.domain.achieved(&episode.scene, &episode.task);
             assert!(!done, "there is nothing to do");
@@ -200,16 +204,16 @@ impl<'a> Person<'a> {
     }
 
     /// A sensible command, or any command.
-    fn wish(&mut self) -> Command {
+    fn wish(&mut self) -> session::Command {
         if self.chance(12) {
             return self.anything();
         }
         match self.session.phase() {
             Phase::Idle if self.chance(15) => self.forget(),
             Phase::Idle => self.start(),
-            Phase::Interacting if self.chance(8) => Command::Done,
+            Phase::Interacting if self.chance(8) => Command::Done.into(),
             Phase::Interacting => self.say(),
-            Phase::Teaching if self.chance(25) => Command::FinishTeaching,
+            Phase::Teaching if self.chance(25) => Command::FinishTeaching.into(),
             Phase::Teaching if self.chance(15) => self.forget(),
             Phase::Teaching => self.teach(),
             Phase::Learning => self.finish(),
@@ -217,38 +221,41 @@ impl<'a> Person<'a> {
         }
     }
 
-    fn anything(&mut self) -> Command {
+    fn anything(&mut self) -> session::Command {
         match below(&self.dice, 16) {
-            0 => Command::Open {
+            0 => session::Command::Open {
                 user: UserId::new("eve").unwrap(),
                 recipe_text: self.house.recipe_text.clone(),
                 mind: Digest::ZERO,
             },
             1 | 2 => self.start(),
             3 | 4 => self.say(),
-            5 | 6 => Command::Done,
+            5 | 6 => Command::Done.into(),
             7..=9 => self.teach(),
-            10 | 11 => Command::FinishTeaching,
+            10 | 11 => Command::FinishTeaching.into(),
             12 | 13 => self.forget(),
             14 => match self.chance(20) {
-                true => Command::Close { reason: "enough of this".to_owned() },
-                false => Command::Say { utterance: " \t".to_owned() },
+                true => Command::Close { reason: "enough of this".to_owned() }.into(),
+                false => Command::Say { utterance: " \t".to_owned() }.into(),
             },
-            _ => Command::FinishRetrain { recipe: Digest::ZERO, outcome: Err("no".to_owned()) },
+            _ => session::Command::FinishRetrain {
+                recipe: Digest::ZERO,
+                outcome: Err("no".to_owned()),
+            },
         }
     }
 
-    fn start(&mut self) -> Command {
+    fn start(&mut self) -> session::Command {
         let (stage, kinds) = stage(&self.dice);
         self.kinds = kinds;
-        Command::StartEpisode { stage }
+        Command::StartEpisode { stage }.into()
     }
 
-    fn say(&mut self) -> Command {
+    fn say(&mut self) -> session::Command {
         let kind = || pick(&self.dice, &self.kinds).map_or("mug".into(), |kind| said(kind.name()));
         let step = self.chance(60).then(|| self.next_step()).flatten();
         if let Some(utterance) = step {
-            return Command::Say { utterance };
+            return Command::Say { utterance }.into();
         }
         let utterance = match below(&self.dice, 10) {
             0 | 1 => format!("flibber the {}", kind()),
@@ -261,10 +268,10 @@ impl<'a> Person<'a> {
             8 => kind(),
             _ => format!("go to the {}", kind()),
         };
-        Command::Say { utterance }
+        Command::Say { utterance }.into()
     }
 
-    fn teach(&mut self) -> Command {
+    fn teach(&mut self) -> session::Command {
         let status = self.session.status();
         let explains = match pick(&self.dice, &(0..status.to_teach.len()).collect::<Vec<_>>()) {
             Some(place) if self.chance(85) => status.to_teach[place].seq,
@@ -285,13 +292,13 @@ impl<'a> Person<'a> {
             _ => Vec::new(),
         };
         let on_clash = [OnClash::Ask, OnClash::Replace, OnClash::Replace, OnClash::Keep];
-        Command::Teach { explains, actions, on_clash: on_clash[below(&self.dice, 4)] }
+        Command::Teach { explains, actions, on_clash: on_clash[below(&self.dice, 4)] }.into()
     }
 
-    fn forget(&mut self) -> Command {
+    fn forget(&mut self) -> session::Command {
         let live: Vec<Seq> = self.session.state().lessons.iter().map(|live| live.seq).collect();
         let lesson = pick(&self.dice, &live).filter(|_| self.chance(85));
-        Command::Forget { lesson: lesson.unwrap_or_else(|| self.any_seq()) }
+        Command::Forget { lesson: lesson.unwrap_or_else(|| self.any_seq()) }.into()
     }
 
     fn any_seq(&self) -> Seq {
@@ -299,18 +306,18 @@ impl<'a> Person<'a> {
     }
 
     /// Ends a training. Only sometimes it trains the real mind, which takes longest.
-    fn finish(&mut self) -> Command {
+    fn finish(&mut self) -> session::Command {
         let Some(Outstanding::Retrain { recipe, lessons }) = self.session.outstanding() else {
-            return Command::Done;
+            return Command::Done.into();
         };
         let digest = recipe.digest();
         if lessons.len() > 2 || !self.chance(15) {
             let outcome = Err("the trainer had a bad day".to_owned());
-            return Command::FinishRetrain { recipe: digest, outcome };
+            return session::Command::FinishRetrain { recipe: digest, outcome };
         }
         let mind = Arc::new(train(&*self.house.domain, &recipe, &lessons).unwrap());
         let outcome = Ok((mind.digest(), Default::default()));
-        let command = Command::FinishRetrain { recipe: digest, outcome };
+        let command = session::Command::FinishRetrain { recipe: digest, outcome };
         self.trained = Some(mind);
         command
     }

@@ -9,10 +9,9 @@ mod wrong;
 
 use std::sync::{Arc, LazyLock};
 
-use apprentice::client::Told;
+use apprentice::client::{Command, Told};
 use apprentice::language::Outcome;
 use apprentice::learning::Recipe;
-use apprentice::session::Command;
 use apprentice::store::open_memory;
 use apprentice::world::Stage;
 use apprentice::world::household::Household;

@@ -1,7 +1,6 @@
 //! A wrong act is named: the same words are not taken for it again, and it can be taught.
 
-use apprentice::client::{OnClash, Phase, RejectionCode};
-use apprentice::session::Command;
+use apprentice::client::{Command, OnClash, Phase, RejectionCode};
 
 use super::{KITCHEN, Talk};
 

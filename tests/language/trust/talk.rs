@@ -7,12 +7,12 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use apprentice::client::Told;
+use apprentice::client::{Command, Told};
 use apprentice::events::{Event, Record};
 use apprentice::ids::{RequestId, Timestamp, UserId};
 use apprentice::language::{Answer, Outcome, Program, Step, Utterance};
 use apprentice::learning::{Lesson, Mind, Recipe, train};
-use apprentice::session::{Command, Proposed, Rejection, Session, Turn, reply_of};
+use apprentice::session::{self, Proposed, Rejection, Session, Turn, reply_of};
 use apprentice::world::household::{Household, Scene, Task};
 use apprentice::world::{Show, Stage, View, World};
 
@@ -112,10 +112,10 @@ impl Talk {
         let mut talk = Talk { session, records: Vec::new(), requests: 0 };
         let user = UserId::new("ada").unwrap();
         let recipe_text = HOUSE.recipe_text.to_owned();
-        talk.give(&Command::Open { user, recipe_text, mind: mind.digest() }).unwrap();
+        talk.give(session::Command::Open { user, recipe_text, mind: mind.digest() }).unwrap();
         talk.session.install(mind);
         let stage = Stage::Scene { scene: setting.text(), task: "free".to_owned() };
-        talk.give(&Command::StartEpisode { stage })
+        talk.give(Command::StartEpisode { stage })
             .unwrap_or_else(|refused| panic!("{refused}\n{}", setting.text()));
         talk
     }
@@ -131,7 +131,7 @@ impl Talk {
 
     /// The answer that would be given now. Nothing changes.
     pub fn asks(&self, text: &str) -> Answer {
-        let command = Command::Say { utterance: text.to_owned() };
+        let command = Command::Say { utterance: text.to_owned() }.into();
         let turn = self.proposes(&command, self.requests + 1);
         let turn = turn.unwrap_or_else(|refused| panic!("{text:?} is refused: {refused}"));
         let answers = turn.batch.events.into_iter().filter_map(|event| match event {
@@ -149,7 +149,7 @@ impl Talk {
     /// - errors: the sentence of the refusal, if the text is no utterance.
     pub fn tries(&mut self, text: &str) -> Result<Answer, Rejection> {
         let first = self.records.len();
-        self.give(&Command::Say { utterance: text.to_owned() })?;
+        self.give(Command::Say { utterance: text.to_owned() })?;
         let told = reply_of(&self.records[first..]).told;
         let answers = told.into_iter().filter_map(|told| match told {
             Told::Answered { answer, .. } => Some(answer),
@@ -158,7 +158,7 @@ impl Talk {
         Ok(answers.last().unwrap_or_else(|| panic!("{text:?} has no answer")))
     }
 
-    fn proposes(&self, command: &Command, request: u128) -> Result<Turn, Rejection> {
+    fn proposes(&self, command: &session::Command, request: u128) -> Result<Turn, Rejection> {
         let at = self.session.next_at(Timestamp(1_000));
         match self.session.propose(command, RequestId(request.to_be_bytes()), at)? {
             Proposed::Turn(turn) => Ok(turn),
@@ -167,9 +167,10 @@ impl Talk {
     }
 
     /// Proposes and applies, as an actor and a log do.
-    fn give(&mut self, command: &Command) -> Result<(), Rejection> {
+    fn give(&mut self, command: impl Into<session::Command>) -> Result<(), Rejection> {
+        let command = command.into();
         self.requests += 1;
-        let turn = self.proposes(command, self.requests)?;
+        let turn = self.proposes(&command, self.requests)?;
         let (request, at) = (turn.batch.request, turn.batch.at);
         for event in turn.batch.events {
             let record = recorded(self.session.head(), &event, request, at);

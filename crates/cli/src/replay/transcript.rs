@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 
-use apprentice::client::{OnClash, Phase};
+use apprentice::client::{Command, OnClash, Phase};
 use apprentice::events::{Ending, EpisodeStarted, Event, Record, SessionOpened};
 use apprentice::ids::Seq;
 use apprentice::language::Document;
@@ -12,7 +12,7 @@ use apprentice::learning::Recipe;
 use apprentice::limits::BATCH_EVENTS_MAX;
 use apprentice::plain;
 use apprentice::plain::count;
-use apprentice::session::{Command, Rejection, Session, command_of};
+use apprentice::session::{Rejection, Session, command_of};
 use apprentice::store::ReadError;
 use apprentice::world::{Domain, Stage};
 
@@ -172,7 +172,7 @@ impl<D: Domain> History<D> {
         // A person who was not asked about a clash need not have said `keep`.
         let asked = Command::Teach { explains, actions: actions.to_vec(), on_clash: OnClash::Ask };
         let batch = &batch[0];
-        let clash = match self.session.propose_recorded(&asked, batch.request, batch.at) {
+        let clash = match self.session.propose_recorded(&asked.into(), batch.request, batch.at) {
             Err(Rejection::Clash { .. }) if on_clash == OnClash::Replace => " replace",
             Err(Rejection::Clash { .. }) => " keep",
             _ => "",
