@@ -3,7 +3,6 @@
 //!
 //! After a change that is meant to change answers, `apprentice transcript run FILE` prints the new
 //! ones. Read them before you replace the old ones.
-//! ones; read them before they replace the old.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
