@@ -225,7 +225,7 @@ fn old() -> Old {
         let mut diary = Diary::new(&domain, &store, name, recipe);
         let say = |diary: &mut Diary<Household>, words: &str| {
             let command = Command::Say { utterance: words.to_owned() };
-            diary.give_as_of_old(&command.into()).unwrap();
+            diary.give_as_of_old(&command).unwrap();
         };
         diary.start("free kitchen");
         say(&mut diary, SAID);
@@ -235,13 +235,13 @@ fn old() -> Old {
         diary.teach(&[1]);
         while let Some(said) = diary.session.status().to_teach.first().map(|said| said.seq) {
             let (actions, on_clash) = (Vec::new(), Default::default());
-            diary.accept(&Command::Teach { explains: said, actions, on_clash }.into());
+            diary.accept(&Command::Teach { explains: said, actions, on_clash });
         }
         diary.learn();
         diary.start("free kitchen");
         say(&mut diary, SAID);
         if closes {
-            diary.give_as_of_old(&Command::Close { reason: evil() }.into()).unwrap();
+            diary.give_as_of_old(&Command::Close { reason: evil() }).unwrap();
         }
     }
     tenant_of_old(&store);
